@@ -1,0 +1,68 @@
+// What the method knows of a surface: a value, a gradient, and the two operators made of them.
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// A closed surface given as the zero set of a function that is negative inside.
+///
+/// Near the surface the value is a distance in world units, to first order. A `Surface` itself is immutable and may be shared by
+/// threads; each thread asks through its own `Probe`, because the grids behind it cache their last access.
+class Surface {
+public:
+    struct Sample {
+        double value;   ///< World units, negative inside.
+        Vec3 gradient;  ///< World units per world unit; about 1 long near the surface, 0 where nothing is known.
+    };
+
+    /// One thread's access to a surface. Cheap to make; must not outlive the surface nor be shared by threads.
+    class Probe {
+    public:
+        virtual ~Probe() = default;
+
+        /// Right in sign everywhere; right in size only below `Surface::reach()`.
+        virtual double value(const Vec3& p) = 0;
+
+        /// Value and gradient together, for less than the price of both.
+        virtual Sample sample(const Vec3& p) = 0;
+
+        /// O1: a point of the surface near `p` by the damped Newton iteration of the paper's algorithm 4, each step at most
+        /// one resolution long. nullopt when there is no way to the surface from here: no gradient (outside the band), or
+        /// no convergence. Override when a formula for the closest point is known.
+        virtual std::optional<Vec3> project(const Vec3& p);
+
+        /// O2: the unit outward normal, the normalised gradient; zero where there is no gradient.
+        virtual Vec3 normal(const Vec3& p);
+
+    protected:
+        /// `epsilon`: a projected point has |value| below this. `max_step`: longest Newton step. World units.
+        Probe(double epsilon, double max_step) : epsilon_(epsilon), max_step_(max_step) {}
+
+    private:
+        double epsilon_, max_step_;
+    };
+
+    virtual ~Surface() = default;
+    virtual std::unique_ptr<Probe> probe() const = 0;
+
+    /// Length of the smallest detail, world units: the voxel size for a grid.
+    virtual double resolution() const = 0;
+
+    /// Half width of the band in which values are distances, world units.
+    virtual double reach() const { return std::numeric_limits<double>::infinity(); }
+
+    /// A box that holds the surface; empty when there is none.
+    virtual Box bounds() const = 0;
+
+    /// Where the edges of a lattice of spacing `resolution()` cross the surface, linearly interpolated: every part of the
+    /// surface wider than a lattice cell holds such points. Always in the same order. This default scans `bounds()`.
+    virtual std::vector<Vec3> crossings() const;
+};
+
+}  // namespace isotrack

@@ -1,0 +1,55 @@
+// The main job: frames of VDB files in, mesh files out. Reads ahead and writes behind.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isotrack/io/run_report.h"
+#include "isotrack/io/sequence.h"
+#include "isotrack/tracking/tracker.h"
+
+namespace isotrack {
+
+/// A length as users give it: world units, or voxels of the first frame that has a surface.
+struct Length {
+    double value = 0.0;
+    bool in_voxels = false;
+    double in_world(double voxel_size) const { return in_voxels ? value * voxel_size : value; }
+};
+
+/// "0.5vx" or "0.01"; must be positive. \throws OptionError.
+Length parse_length(const std::string& text);
+std::string to_string(const Length& length);
+
+enum class OnError { Skip, Stop };            ///< After a frame that cannot be used: go on, or end the run there.
+enum class OnMissing { Skip, Stop };          ///< A gap in the frame numbers: go on with a note, or refuse before the work.
+enum class OnExisting { Refuse, Overwrite, Skip };
+
+struct MeshSequenceOptions {
+    Length tolerance{0.5, true};
+    double angle_deg = 40.0;
+    std::optional<Length> min_edge, max_edge;
+    Method method = Method::Tolerance;
+    Reconstruction reconstruction = Reconstruction::Guided;
+    std::uint64_t seed = 1;
+    std::optional<std::string> grid, velocity_grid;  ///< NAME or NAME[i]; unset: chosen by `choose_grid`.
+    double iso = 0.0;
+    std::optional<double> fps;                       ///< > 0. Set: velocities per second; unset: per frame.
+    OnError on_error = OnError::Skip;
+    OnMissing on_missing = OnMissing::Skip;
+    OnExisting on_existing = OnExisting::Refuse;
+};
+
+/// Tracks `input` and writes one mesh per frame to `output` (a pattern with a number field, or a plain path for a single frame).
+/// Calls `on_frame` after each row, in order, from the calling thread. A frame that cannot be used becomes a row with status "failed"
+/// and its cause; the frames after it are tracked on from the last good one. The report holds a row for every input frame.
+/// \throws OptionError before any work: bad option, unknown extension, output without a number field, or outputs that exist.
+RunReport mesh_sequence(const InputSequence& input, const std::string& output, const MeshSequenceOptions& options,
+                        const std::function<void(const FrameReport&)>& on_frame = {});
+
+/// 0: every row is good; 1: no frame came through; 3: some frames failed or missed their checks.
+int exit_code(const RunReport& report);
+
+}  // namespace isotrack

@@ -1,0 +1,75 @@
+// The tracker: particles on a deforming surface from one frame to the next, and a mesh of each.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "isotrack/sampling/particles.h"
+#include "isotrack/surface/surface.h"
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+enum class Method {
+    Tolerance,  ///< Spacing from the measured error, fed back: fewest triangles for a tolerance.
+    Paper       ///< The paper's angle-driven metric, Gaussian energy, coordinate descent and thresholds.
+};
+
+enum class Reconstruction {
+    Guided,  ///< Cells labelled inside or outside with the help of the level set.
+    Pure     ///< The geometric convection of the particles alone, as in the paper; for comparison.
+};
+
+/// All lengths in world units.
+struct TrackerOptions {
+    double tolerance = 0.0;              ///< > 0. Largest wanted distance between mesh and surface, either way.
+    double angle_deg = 40.0;             ///< Largest wanted angle between the normals of neighbours, degrees in (0, 90].
+    std::optional<double> min_edge;      ///< Smallest spacing. Unset: half the surface's resolution.
+    std::optional<double> max_edge;      ///< Largest spacing. Unset: 40 times the surface's resolution.
+    Method method = Method::Tolerance;
+    Reconstruction reconstruction = Reconstruction::Guided;
+    std::uint64_t seed = 1;              ///< Same seed, same surfaces: same meshes, at any thread count.
+};
+
+/// What became of one frame.
+struct TrackedFrame {
+    TriangleMesh mesh;          ///< Closed, oriented, 2-manifold; ids and velocities (displacement since the last frame) per vertex.
+    std::size_t particles = 0;  ///< Vertices beyond these are copies that keep the mesh manifold.
+    std::size_t born = 0, died = 0, seeded = 0, lost = 0;
+    int sweeps = 0;             ///< Relaxation sweeps over all particles.
+    std::size_t relocated = 0;  ///< Vertices the tetrahedralisation moved one by one.
+    std::string delaunay_strategy;
+    double max_error = 0.0, rms_error = 0.0;  ///< Distance mesh to surface and back, measured on `mesh`, world units.
+    bool within_tolerance = true;
+    std::map<std::string, double> seconds;    ///< Per stage: carry, cover, size, relax, delaunay, convect, certify.
+};
+
+/// Follows one surface. Not for concurrent use: frames depend on each other. Uses TBB inside.
+class Tracker {
+public:
+    /// \throws OptionError for an option outside its range.
+    explicit Tracker(const TrackerOptions& options);
+    ~Tracker();
+    Tracker(Tracker&&) noexcept;
+    Tracker& operator=(Tracker&&) noexcept;
+
+    /// Where a point of the last frame is expected in the next: a velocity field's guess.
+    using Motion = std::function<Vec3(const Vec3&)>;
+
+    /// Goes on to the next frame, or starts. Without `motion` the particles' own last displacements are extrapolated. An empty surface
+    /// gives an empty mesh and drops all particles; the next surface with something in it starts afresh, ids counting on.
+    TrackedFrame advance(const Surface& surface, const Motion& motion = {});
+
+    /// The particles of the last frame.
+    const Particles& particles() const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isotrack
