@@ -142,10 +142,11 @@ private:
 };
 
 /// A lattice edge that crosses the surface: from `from`, `fraction` of a voxel along `axis`.
-struct Crossing {
+struct CrossedEdge {
     Coord from;
     int axis;
     float fraction;
+    bool outward;    ///< `from` is the end inside.
     bool at_border;  ///< One end is an inactive voxel.
 
     Vec3 index() const {
@@ -156,21 +157,21 @@ struct Crossing {
 };
 
 /// Every edge with a sign change, leaf by leaf. Edges between two tiles are not seen: a level set has voxels at its surface.
-std::vector<Crossing> find_crossings(const FloatTree& tree) {
+std::vector<CrossedEdge> find_crossings(const FloatTree& tree) {
     const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
-    std::vector<std::vector<Crossing>> per_leaf(leaves.leafCount());
+    std::vector<std::vector<CrossedEdge>> per_leaf(leaves.leafCount());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.leafCount(), 16), [&](const auto& range) {
         Accessor accessor(tree);
         for (std::size_t n = range.begin(); n < range.end(); ++n) {
             const Leaf& leaf = leaves.leaf(n);
             const float* data = leaf.buffer().data();
             const Coord origin = leaf.origin();
-            std::vector<Crossing>& found = per_leaf[n];
+            std::vector<CrossedEdge>& found = per_leaf[n];
             const auto add = [&](const Coord& from, int axis, float a, float b) {
                 if ((a < 0.0f) == (b < 0.0f)) return;
                 const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
                 const bool border = !accessor.isValueOn(from) || !accessor.isValueOn(from.offsetBy(axis == 0, axis == 1, axis == 2));
-                found.push_back({from, axis, fraction, border});
+                found.push_back({from, axis, fraction, a < 0.0f, border});
             };
             constexpr int kStride[3] = {kLeafDim * kLeafDim, kLeafDim, 1};
             for (int i = 0; i < static_cast<int>(Leaf::SIZE); ++i) {
@@ -203,7 +204,7 @@ std::vector<Crossing> find_crossings(const FloatTree& tree) {
             }
         }
     });
-    std::vector<Crossing> all;
+    std::vector<CrossedEdge> all;
     std::size_t count = 0;
     for (const auto& part : per_leaf) count += part.size();
     all.reserve(count);
@@ -212,7 +213,7 @@ std::vector<Crossing> find_crossings(const FloatTree& tree) {
 }
 
 /// Median length of the world gradient at the surface, away from the border; 0 when there is nothing to measure.
-double slope_at_surface(const FloatTree& tree, const AffineMap& map, const std::vector<Crossing>& crossings) {
+double slope_at_surface(const FloatTree& tree, const AffineMap& map, const std::vector<CrossedEdge>& crossings) {
     constexpr std::size_t kSamples = 4000;
     Stencil stencil(tree);
     std::vector<double> slopes;
@@ -295,7 +296,7 @@ struct LevelSet::Impl {
     double scale = 1.0;
     double reach = 0.0;
     std::size_t active_voxels = 0, border_crossings = 0;
-    std::vector<Vec3> crossings;
+    std::vector<Surface::Crossing> crossings;
     Box bounds;
 
     Impl(const openvdb::GridBase::ConstPtr& source, const LevelSetOptions& options) : map(*source) {
@@ -322,7 +323,7 @@ struct LevelSet::Impl {
             grid = floats;
         }
 
-        std::vector<Crossing> found = find_crossings(grid->constTree());
+        std::vector<CrossedEdge> found = find_crossings(grid->constTree());
         if (found.empty() && active_voxels > 0 && grid_class != openvdb::GRID_LEVEL_SET)
             throw InputError(grid_label(*source) + " is not a level set: its values do not change sign around " +
                              std::to_string(options.iso) + " (class '" +
@@ -338,9 +339,10 @@ struct LevelSet::Impl {
         const double background = grid->background();
         reach = std::clamp(background, map.voxel_size, kFarVoxels * map.voxel_size);
         crossings.reserve(found.size());
-        for (const Crossing& c : found) {
-            crossings.push_back(map.to_world(c.index()));
-            bounds.extend(crossings.back());
+        for (const CrossedEdge& c : found) {
+            const Vec3 outward = map.linear.col(c.axis).normalized() * (c.outward ? 1.0 : -1.0);
+            crossings.push_back({map.to_world(c.index()), outward.cast<float>()});
+            bounds.extend(crossings.back().point);
         }
     }
 
@@ -431,7 +433,7 @@ std::unique_ptr<Surface::Probe> LevelSet::probe() const {
 double LevelSet::resolution() const { return impl_->map.voxel_size; }
 double LevelSet::reach() const { return impl_->reach; }
 Box LevelSet::bounds() const { return impl_->bounds; }
-std::vector<Vec3> LevelSet::crossings() const { return impl_->crossings; }
+std::vector<Surface::Crossing> LevelSet::crossings() const { return impl_->crossings; }
 bool LevelSet::empty() const { return impl_->crossings.empty(); }
 std::size_t LevelSet::active_voxels() const { return impl_->active_voxels; }
 double LevelSet::value_scale() const { return impl_->scale; }

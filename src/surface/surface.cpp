@@ -44,8 +44,8 @@ Vec3 Surface::Probe::normal(const Vec3& p) {
     return gradient / length;
 }
 
-std::vector<Vec3> Surface::crossings() const {
-    std::vector<Vec3> result;
+std::vector<Surface::Crossing> Surface::crossings() const {
+    std::vector<Crossing> result;
     const Box box = bounds();
     if (box.isEmpty()) return result;
     const double h = resolution();
@@ -62,7 +62,9 @@ std::vector<Vec3> Surface::crossings() const {
                 layer[static_cast<std::size_t>(y) * n.z() + z] = access->value(origin + h * Vec3(x, y, z));
     };
     const auto cross = [&](double a, double b, const Vec3& at, int axis) {
-        if ((a < 0.0) != (b < 0.0)) result.push_back(at + h * (a / (a - b)) * Vec3::Unit(axis));
+        if ((a < 0.0) == (b < 0.0)) return;
+        const float direction = a < 0.0 ? 1.0f : -1.0f;
+        result.push_back({at + h * (a / (a - b)) * Vec3::Unit(axis), direction * Eigen::Vector3f::Unit(axis)});
     };
     fill(0, next);
     for (int x = 0; x < n.x(); ++x) {
