@@ -5,6 +5,8 @@
 #include <numeric>
 #include <utility>
 
+#include "isotrack/sampling/particle_grid.h"
+
 namespace isotrack {
 
 std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency, const PopulationBand& band) {
@@ -63,6 +65,45 @@ std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& trian
         ++added;
     }
     return added;
+}
+
+std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface, double min_spacing,
+                    Id& next_id) {
+    constexpr double kApart = 0.5, kShrink = 0.6;
+    if (shortages.empty()) return 0;
+    PointGrid grid(2.0 * surface.resolution());
+    for (std::size_t i = 0; i < particles.size(); ++i) grid.insert(particles.position[i], static_cast<int>(i));
+    std::vector<char> shrunk(particles.size(), 0);
+    const auto probe = surface.probe();
+    std::size_t changes = 0;
+    for (const Shortage& s : shortages) {
+        const auto p = probe->project(s.place);
+        if (!p) continue;
+        const Vec3 n = probe->normal(*p);
+        double h = std::max(s.spacing, min_spacing);
+        int nearest = -1;
+        double least = 1e300;
+        grid.for_each_within(*p, kApart * h, [&](int i, double d2) {
+            if (d2 >= least || !(particles.normal[i].dot(n) > 0.0)) return;
+            least = d2;
+            nearest = i;
+        });
+        if (nearest >= 0) {
+            h = std::max(min_spacing, kShrink * std::min(h, particles.spacing[nearest]));
+            if (std::sqrt(least) < kApart * h) {
+                if (shrunk[nearest] || particles.spacing[nearest] <= min_spacing) continue;
+                particles.spacing[nearest] = h;
+                shrunk[nearest] = 1;
+                ++changes;
+                continue;
+            }
+        }
+        grid.insert(*p, static_cast<int>(particles.size()));
+        particles.add(*p, n, h, next_id++);
+        shrunk.push_back(1);
+        ++changes;
+    }
+    return changes;
 }
 
 }  // namespace isotrack

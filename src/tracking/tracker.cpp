@@ -28,7 +28,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3;
 constexpr int kSizingSteps = 4, kCertifySteps = 6;  // barycentric lattice of the error samples
-constexpr int kCertifyRounds = 8;
+constexpr int kCertifyRounds = 12;
+constexpr double kLeastSpacing = 0.05;  // resolutions: for shreds of a single voxel, where nothing coarser closes
 
 /// Adds the time from its construction to its destruction to a stage.
 class StageTimer {
@@ -162,46 +163,26 @@ struct Tracker::Impl {
     /// New particles where the mesh fails. Returns how many; 0 when it passes.
     std::size_t refine(const Build& b, const Surface& surface, const SizingLimits& l,
                        const std::vector<Surface::Crossing>& crossings) {
-        std::vector<Vec3> where;
-        std::vector<double> spacing;
+        std::vector<Shortage> shortages;
         const auto errors = triangle_errors(b.vertices, b.carved.triangles, surface, kCertifySteps);
         for (std::size_t t = 0; t < errors.size(); ++t) {
             if (errors[t].largest <= l.tolerance) continue;
             double h = l.max_edge;
             for (const int v : b.carved.triangles[t])
                 if (const int p = b.carved.particle[v]; p >= 0) h = std::min(h, particles.spacing[p]);
-            where.push_back(errors[t].where);
-            spacing.push_back(0.7 * h);
+            shortages.push_back({errors[t].where, 0.7 * h});
         }
         const auto distances = crossing_distances(b.vertices, b.carved.triangles, crossings, l.tolerance);
         for (std::size_t c = 0; c < crossings.size(); ++c)
-            if (!(distances[c] <= l.tolerance)) {
-                where.push_back(crossings[c].point);
-                spacing.push_back(2.0 * surface.resolution());
-            }
+            if (!(distances[c] <= l.tolerance)) shortages.push_back({crossings[c].point, 2.0 * surface.resolution()});
         for (std::size_t e = 0; e + 1 < b.carved.complex_edge_ends.size(); e += 2) {
             const int p = b.carved.complex_edge_ends[e], q = b.carved.complex_edge_ends[e + 1];
-            where.push_back(0.5 * (particles.position[p] + particles.position[q]));
-            spacing.push_back(0.7 * std::min(particles.spacing[p], particles.spacing[q]));
+            shortages.push_back({0.5 * (particles.position[p] + particles.position[q]),
+                                 0.7 * std::min(particles.spacing[p], particles.spacing[q])});
         }
-        // One after the other, none nearer than half its spacing to another or to one that was there.
-        const auto probe = surface.probe();
-        std::size_t added = 0;
-        const std::size_t old = particles.size();
-        for (std::size_t k = 0; k < where.size(); ++k) {
-            const auto p = probe->project(where[k]);
-            if (!p) continue;
-            const Vec3 n = probe->normal(*p);
-            const double h = std::max(spacing[k], l.min_edge), apart = 0.5 * h;
-            bool near = false;
-            for (std::size_t i = 0; i < particles.size() && !near; ++i)
-                near = (particles.position[i] - *p).squaredNorm() < apart * apart && particles.normal[i].dot(n) > 0.0;
-            if (near) continue;
-            particles.add(*p, n, h, next_id++);
-            ++added;
-        }
-        (void)old;
-        return added;
+        if (getenv("ISO_DEBUG")) std::fprintf(stderr, "  shortages: %zu complex %zu\n", shortages.size(), b.carved.complex_edges);
+        const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
+        return densify(particles, shortages, surface, least, next_id);
     }
 
     TrackedFrame advance(const Surface& surface, const Motion& motion);

@@ -25,4 +25,16 @@ std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacen
 std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& triangles, const Surface& surface, Id& next_id,
                         const PopulationBand& band = {});
 
+/// A place where the mesh fails, and the spacing that would mend it.
+struct Shortage {
+    Vec3 place;
+    double spacing;  ///< World units.
+};
+
+/// Adds particles at the projections of `shortages`, in their order, at least half their spacing from particles that face the same way. Where
+/// one is nearer its own spacing shrinks instead, by 0.6 a call and down to `min_spacing`, so that repeated calls get denser. Returns how
+/// many were added plus how many shrank: 0 means that nothing more can be done.
+std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface, double min_spacing,
+                    Id& next_id);
+
 }  // namespace isotrack
