@@ -120,15 +120,16 @@ struct Ellipsoid {
 
         Vec3 on_unit_sphere;  // x_i / e_i
         const auto evaluate = [&](double u) {
-            for (int i = 0; i < 3; ++i) on_unit_sphere[i] = z[i] > 0.0 ? r[i] * z[i] / (u + r[i] - 1.0) : 0.0;
+            for (int i = 0; i < 3; ++i)
+                on_unit_sphere[i] = z[i] > 0.0 ? r[i] * z[i] / (u + (r[i] - 1.0)) : 0.0;
             return on_unit_sphere.squaredNorm() - 1.0;
         };
 
         // Each term alone reaches 1 at or left of the root, so the largest of these places is left of it too.
         // The function falls and is convex: from there Newton climbs to the root without ever passing it.
-        double u = (r.cwiseProduct(z) - r + Vec3::Ones()).maxCoeff();
+        double u = (r.cwiseProduct(z) - (r - Vec3::Ones())).maxCoeff();
         double g = evaluate(u);
-        if (g < 0.0) {
+        if (u == 0.0 && g < 0.0) {
             // In the plane of symmetry across the shortest axis, too deep inside for any root: two closest
             // points, at u = 0, mirror images of each other.
             on_unit_sphere[shortest] = std::sqrt(-g);
@@ -138,7 +139,7 @@ struct Ellipsoid {
             for (int round = 0; round < kMaxRounds && g > 0.0; ++round) {
                 double slope = 0.0;
                 for (int i = 0; i < 3; ++i)
-                    if (z[i] > 0.0) slope -= 2.0 * on_unit_sphere[i] * on_unit_sphere[i] / (u + r[i] - 1.0);
+                    if (z[i] > 0.0) slope -= 2.0 * on_unit_sphere[i] * on_unit_sphere[i] / (u + (r[i] - 1.0));
                 const double next = u - g / slope;
                 if (!(next > u)) break;
                 u = next;
@@ -473,9 +474,13 @@ SurfacePtr blended_spheres(const Vec3& centre_a, double radius_a, const Vec3& ce
     require_positive(radius_b, "the radius of a sphere");
     require_positive(fillet, "the fillet between two spheres");
     const Vec3 axis = centre_b - centre_a;
-    const Eigen::Isometry3d motion =
-        Eigen::Translation3d(centre_a) * Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), axis);
-    return moved(place(BallPair(radius_a, radius_b, axis.norm(), fillet), Vec3::Zero(), resolution), motion);
+    const SurfacePtr upright =
+        place(BallPair(radius_a, radius_b, axis.norm(), fillet), Vec3::Zero(), resolution);
+    Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+    const Vec3 z = axis.normalized(), x = z.unitOrthogonal();
+    motion.linear() << x, z.cross(x), z;
+    motion.translation() = centre_a;
+    return moved(upright, motion);
 }
 
 SurfacePtr moved(SurfacePtr solid, const Eigen::Isometry3d& motion) {
