@@ -54,7 +54,9 @@ std::vector<fs::path> output_paths(const GenerateArguments& arguments) {
 void write_frame(const SampleFrame& frame, const fs::path& path) {
     fs::path temporary = path;
     temporary += ".part";
-    openvdb::GridPtrVec grids{frame.surface};
+    openvdb::GridPtrVec grids;
+    grids.reserve(2);
+    grids.push_back(frame.surface);
     if (frame.velocity) grids.push_back(frame.velocity);
     try {
         openvdb::io::File(temporary.string()).write(grids);
