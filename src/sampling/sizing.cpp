@@ -81,7 +81,10 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
             sum += log_k2[j];
             ++count;
         }
-        double h = std::exp(-0.5 * sum / count);
+        // The mean keeps noise out; where the tolerance is missed the particle's own need counts.
+        const double mean = sum / count;
+        const bool missed = evidence.error[i] > 0.95 * limits.tolerance;
+        double h = std::exp(-0.5 * (missed ? std::max(mean, log_k2[i]) : mean));
         // 1 - cos t ~ t^2 / 2, so the curvature is sqrt(2) k_nd.
         const double kappa = std::sqrt(2.0) * normal_deviation(particles, adjacency, i);
         if (kappa > 0.0) h = std::min(h, std::max(limits.angle / kappa, 0.7 * particles.spacing[i]));

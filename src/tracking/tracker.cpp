@@ -27,8 +27,8 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3;
-constexpr int kSizingSteps = 4, kCertifySteps = 6;  // barycentric lattice of the error samples
-constexpr int kCertifyRounds = 12;
+constexpr int kSizingSteps = 3, kCertifySteps = 6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
+constexpr int kCertifyRounds = 12, kRelaxedCertifyRounds = 4;
 constexpr double kLeastSpacing = 0.05;  // resolutions: for shreds of a single voxel, where nothing coarser closes
 
 /// Adds the time from its construction to its destruction to a stage.
@@ -214,6 +214,7 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         }
         const StageTimer timer(seconds, "relax");
         frame.sweeps += relax(particles, b.adjacency, surface, kSweepsPerRound);
+        if (round + 1 == rounds) break;
         const auto keep = uncrowded(particles, b.adjacency);
         fill_sparse(particles, b.particle_triangles(), surface, next_id);
         auto all = keep;
@@ -229,6 +230,9 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
             std::fprintf(stderr, "certify %d: n %zu added %zu complex %zu pinched %zu unused %zu\n", round, particles.size(), added,
                          b.carved.complex_edges, b.carved.pinched.size(), b.carved.unused.size());
         if (added == 0) break;
+        b = build(surface, seconds);
+        if (round >= kRelaxedCertifyRounds) continue;
+        frame.sweeps += relax(particles, b.adjacency, surface, 2);
         b = build(surface, seconds);
     }
 
