@@ -1,7 +1,12 @@
 // isotrack generate: sample sequences, written as VDB files.
+#include <fmt/format.h>
+#include <openvdb/io/Archive.h>
+#include <openvdb/openvdb.h>
 #include <spdlog/spdlog.h>
 
+#include <cerrno>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <system_error>
@@ -50,16 +55,27 @@ std::vector<fs::path> output_paths(const GenerateArguments& arguments) {
     return paths;
 }
 
+/// Writes a file as openvdb::io::File does, but notices when not all of it arrives: on a full disk File says
+/// nothing.
+class CheckedFile : public openvdb::io::Archive {
+public:
+    void write(const openvdb::GridCPtrVec& grids, const fs::path& path) const {
+        std::ofstream stream(path, std::ios::binary);
+        if (stream) Archive::write(stream, grids, /*seekable=*/true);
+        stream.close();
+        if (!stream) throw IoError(std::generic_category().message(errno));
+    }
+};
+
 /// By a temporary name in the same folder, so that no reader ever meets half a file.
 void write_frame(const SampleFrame& frame, const fs::path& path) {
-    fs::path temporary = path;
-    temporary += ".part";
-    openvdb::GridPtrVec grids;
-    grids.reserve(2);
+    openvdb::GridCPtrVec grids;
     grids.push_back(frame.surface);
     if (frame.velocity) grids.push_back(frame.velocity);
+    fs::path temporary = path;
+    temporary += ".part";
     try {
-        openvdb::io::File(temporary.string()).write(grids);
+        CheckedFile().write(grids, temporary);
         fs::rename(temporary, path);
     } catch (const std::exception& error) {
         std::error_code ignored;
@@ -68,22 +84,26 @@ void write_frame(const SampleFrame& frame, const fs::path& path) {
     }
 }
 
+void make_folder_of(const fs::path& path) {
+    if (!path.has_parent_path()) return;
+    std::error_code error;
+    fs::create_directories(path.parent_path(), error);
+    if (error)
+        throw IoError(
+            fmt::format("cannot make the folder '{}': {}", path.parent_path().string(), error.message()));
+}
+
 int generate(const GenerateArguments& arguments) {
     SampleSequence sequence(arguments.shape, arguments.options);
     const std::vector<fs::path> paths = output_paths(arguments);
-    const fs::path folder = paths.front().parent_path();
-    std::error_code error;
-    if (!folder.empty()) fs::create_directories(folder, error);
-    if (error)
-        throw IoError(fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()));
-
+    for (const fs::path& path : paths) make_folder_of(path);
     for (const fs::path& path : paths) {
         const SampleFrame frame = sequence.next();
         write_frame(frame, path);
         spdlog::debug("{}: {} voxels", path.string(), frame.surface->activeVoxelCount());
     }
-    spdlog::info("wrote {} frames of {}, {} to {}", paths.size(), arguments.shape, paths.front().string(),
-                 paths.back().string());
+    spdlog::info("wrote {} frame{} of {}, {} to {}", paths.size(), paths.size() == 1 ? "" : "s",
+                 arguments.shape, paths.front().string(), paths.back().string());
     return 0;
 }
 
