@@ -20,7 +20,7 @@ struct MeshArguments {
     std::string output, report;
     std::string tolerance = "0.5vx", min_edge, max_edge;
     std::string frames, grid, velocity_grid;
-    double fps = 0.0;
+    double fps = 0.0, angle = 0.0;
     bool overwrite = false, skip_existing = false;
     MeshSequenceOptions options;
 };
@@ -89,6 +89,7 @@ int run(MeshArguments& a, const CLI::App& app, const std::string& command_line) 
     if (!a.max_edge.empty()) o.max_edge = parse_length(a.max_edge);
     if (app.count("--grid")) o.grid = a.grid;
     if (app.count("--velocity-grid")) o.velocity_grid = a.velocity_grid;
+    if (app.count("--angle")) o.angle_deg = a.angle;
     if (app.count("--fps")) o.fps = a.fps;
     o.on_existing = a.overwrite ? OnExisting::Overwrite : a.skip_existing ? OnExisting::Skip : OnExisting::Refuse;
 
@@ -122,7 +123,7 @@ void add_mesh_command(CLI::App& app, int& result) {
     mesh->add_option("-o,--output", a->output, "Mesh files, with #### for the frame number: .ply .obj .off .stl .vtk")->required();
     mesh->add_option("--tolerance", a->tolerance, "Largest distance between mesh and level set, either way: 0.5vx (voxels) or world units")
         ->capture_default_str();
-    mesh->add_option("--angle", a->options.angle_deg, "Largest angle between neighbour normals, degrees")->capture_default_str();
+    mesh->add_option("--angle", a->angle, "Wanted angle between neighbour normals, degrees (default 60, with --method paper 20)");
     mesh->add_option("--min-edge", a->min_edge, "Smallest particle spacing (default 0.5vx)");
     mesh->add_option("--max-edge", a->max_edge, "Largest particle spacing (default 40vx)");
     mesh->add_option("--frames", a->frames, "A:B or A:B:STEP, ends included");

@@ -95,15 +95,4 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
     limit_gradation(particles, adjacency);
 }
 
-void update_spacing_as_in_paper(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence,
-                                const SizingLimits& limits) {
-    std::vector<double> next(particles.size());
-    for_each_particle(particles.size(), [&](std::size_t i) {
-        const double k = std::max(normal_deviation(particles, adjacency, i), 1.0 / evidence.thickness[i]);
-        // Constant d means constant angle between neighbours: t = sqrt(2) d.
-        next[i] = bounded(k > 0.0 ? limits.angle / (std::sqrt(2.0) * k) : limits.max_edge, limits);
-    });
-    particles.spacing.swap(next);
-}
-
 }  // namespace isotrack

@@ -122,7 +122,7 @@ std::map<std::string, std::string> effective_settings(const MeshSequenceOptions&
     s["tolerance"] = length(t.tolerance);
     s["min_edge"] = length(t.min_edge.value_or(0.5 * voxel_size));
     s["max_edge"] = length(t.max_edge.value_or(40.0 * voxel_size));
-    s["angle"] = std::to_string(static_cast<int>(std::lround(t.angle_deg))) + " degrees";
+    s["angle"] = std::to_string(std::lround(t.angle_deg.value_or(default_angle_deg(t.method)))) + " degrees";
     s["method"] = options.method == Method::Paper ? "paper" : "tolerance";
     s["reconstruct"] = options.reconstruction == Reconstruction::Pure ? "pure" : "guided";
     s["seed"] = std::to_string(options.seed);

@@ -16,6 +16,7 @@
 #include "isotrack/meshing/certify.h"
 #include "isotrack/meshing/convection.h"
 #include "isotrack/meshing/manifold.h"
+#include "isotrack/sampling/coordinate_descent.h"
 #include "isotrack/sampling/cover.h"
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/relaxation.h"
@@ -72,6 +73,23 @@ std::vector<double> thickness_of(const Particles& particles, const Adjacency& ad
     return th;
 }
 
+/// The DT as the paper's descent sees it. The DT numbers its vertices as the particles are numbered.
+class DelaunayNeighbours final : public MovingNeighbours {
+public:
+    explicit DelaunayNeighbours(const std::vector<Vec3>& points) : dt_(make_tetrahedralisation(UpdateStrategy::Rebuild)) {
+        dt_->assign(points);
+    }
+    void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
+    void moved(int i, const Vec3& to) override { dt_->move(i, to); }
+    void added(int, const Vec3& at, int near) override { dt_->insert(at, near); }
+    void removed(int i) override { dt_->remove(i); }
+    void settle() override { dt_->settle(); }
+    std::size_t relocated() const { return dt_->relocated(); }
+
+private:
+    std::unique_ptr<Tetrahedralisation> dt_;
+};
+
 /// Files hold floats: what is certified must be what is written.
 void round_to_float(Particles& particles) {
     for (Vec3& p : particles.position) p = p.cast<float>().cast<double>();
@@ -86,8 +104,8 @@ struct Tracker::Impl {
 
     explicit Impl(const TrackerOptions& o) : options(o) {
         if (!(o.tolerance > 0.0)) throw OptionError("the tolerance must be a positive length, got " + std::to_string(o.tolerance));
-        if (!(o.angle_deg > 0.0 && o.angle_deg <= 90.0))
-            throw OptionError("the angle must be in (0, 90] degrees, got " + std::to_string(o.angle_deg));
+        if (o.angle_deg && !(*o.angle_deg > 0.0 && *o.angle_deg <= 90.0))
+            throw OptionError("the angle must be in (0, 90] degrees, got " + std::to_string(*o.angle_deg));
         if (o.min_edge && !(*o.min_edge > 0.0)) throw OptionError("the smallest edge must be a positive length");
         if (o.max_edge && !(*o.max_edge > 0.0)) throw OptionError("the largest edge must be a positive length");
         if (o.min_edge && o.max_edge && *o.min_edge > *o.max_edge) throw OptionError("the smallest edge is longer than the largest");
@@ -96,7 +114,7 @@ struct Tracker::Impl {
     SizingLimits limits(const Surface& surface) const {
         SizingLimits l{};
         l.tolerance = options.tolerance;
-        l.angle = options.angle_deg * kPi / 180.0;
+        l.angle = options.angle_deg.value_or(default_angle_deg(options.method)) * kPi / 180.0;
         l.min_edge = options.min_edge.value_or(0.5 * surface.resolution());
         l.max_edge = std::max(options.max_edge.value_or(40.0 * surface.resolution()), l.min_edge);
         return l;
@@ -185,25 +203,14 @@ struct Tracker::Impl {
         return densify(particles, shortages, surface, least, next_id);
     }
 
+    void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
+    void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     TrackedFrame advance(const Surface& surface, const Motion& motion);
 };
 
-TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion) {
-    TrackedFrame frame;
+/// Rounds of: mesh, measure, size, relax, births and deaths. More of them the more particles are new.
+void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame) {
     auto& seconds = frame.seconds;
-    frame.delaunay_strategy = name_of(UpdateStrategy::Rebuild);
-    const SizingLimits l = limits(surface);
-    const std::vector<Id> before = particles.id;
-    const bool warm = !particles.empty();
-    const Id first_new = next_id;
-    {
-        const StageTimer timer(seconds, "carry");
-        frame.lost = carry(surface, motion);
-    }
-    {
-        const StageTimer timer(seconds, "cover");
-        frame.seeded = cover(particles, surface, l, options.seed, next_id);
-    }
     const double fresh = particles.empty() ? 0.0 : static_cast<double>(frame.seeded) / static_cast<double>(particles.size());
     const int rounds = warm ? kWarmRounds + static_cast<int>(std::lround(std::min(1.0, 4.0 * fresh) * (kColdRounds - kWarmRounds))) : kColdRounds;
     for (int round = 0; round < rounds; ++round) {
@@ -221,9 +228,46 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         all.resize(particles.size(), 1);
         particles.retain(all);
     }
+}
+
+void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame) {
+    constexpr int kMostColdSweeps = 60, kMostWarmSweeps = 12;
+    if (particles.empty()) return;
+    const StageTimer timer(frame.seconds, "relax");
+    DelaunayNeighbours structure(particles.position);
+    CoordinateDescentOptions o;
+    o.most_sweeps = warm ? kMostWarmSweeps : kMostColdSweeps;
+    o.seed = options.seed;
+    const std::size_t count = particles.size();
+    const CoordinateDescentReport report = coordinate_descent(particles, structure, surface, l, next_id, o);
+    frame.sweeps = static_cast<int>(report.steps / std::max<std::size_t>(1, count));
+    frame.relocated = structure.relocated();
+}
+
+TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion) {
+    TrackedFrame frame;
+    auto& seconds = frame.seconds;
+    frame.delaunay_strategy = name_of(UpdateStrategy::Rebuild);
+    const SizingLimits l = limits(surface);
+    const std::vector<Id> before = particles.id;
+    const bool warm = !particles.empty();
+    const Id first_new = next_id;
+    {
+        const StageTimer timer(seconds, "carry");
+        frame.lost = carry(surface, motion);
+    }
+    {
+        const StageTimer timer(seconds, "cover");
+        frame.seeded = cover(particles, surface, l, options.seed, next_id);
+    }
+    if (options.method == Method::Paper)
+        sample_as_in_paper(surface, l, warm, frame);
+    else
+        sample(surface, l, warm, frame);
     const std::vector<Surface::Crossing> crossings = surface.crossings();
     Build b = build(surface, seconds);
-    for (int round = 0; round < kCertifyRounds; ++round) {
+    const int certify_rounds = options.method == Method::Paper ? 0 : kCertifyRounds;
+    for (int round = 0; round < certify_rounds; ++round) {
         const StageTimer timer(seconds, "certify");
         const std::size_t added = refine(b, surface, l, crossings);
         if (getenv("ISO_DEBUG"))
@@ -264,6 +308,8 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
     for (const Id id : before) frame.died += now.count(id) == 0;
     return frame;
 }
+
+double default_angle_deg(Method method) { return method == Method::Paper ? 20.0 : 60.0; }
 
 Tracker::Tracker(const TrackerOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 Tracker::~Tracker() = default;

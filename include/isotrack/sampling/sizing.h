@@ -32,9 +32,4 @@ double normal_deviation(const Particles& particles, const Adjacency& adjacency, 
 /// angle, the thickness and the limits bound it, and the gradation h_i <= h_j + 0.25 r_ij smooths it.
 void update_spacing(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence, const SizingLimits& limits);
 
-/// The paper's metric: k_i^2 = max(k_nd^2, 1 / th^2), as the spacing h = s / k_i with the angle s (radians) between neighbours' normals, kept
-/// between the limits.
-void update_spacing_as_in_paper(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence,
-                                const SizingLimits& limits);
-
 }  // namespace isotrack

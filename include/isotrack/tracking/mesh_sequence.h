@@ -29,7 +29,7 @@ enum class OnExisting { Refuse, Overwrite, Skip };
 
 struct MeshSequenceOptions {
     Length tolerance{0.5, true};
-    double angle_deg = 40.0;
+    std::optional<double> angle_deg;
     std::optional<Length> min_edge, max_edge;
     Method method = Method::Tolerance;
     Reconstruction reconstruction = Reconstruction::Guided;
