@@ -15,6 +15,7 @@
 #include "isotrack/error.h"
 #include "isotrack/meshing/certify.h"
 #include "isotrack/meshing/convection.h"
+#include "isotrack/meshing/fit.h"
 #include "isotrack/meshing/manifold.h"
 #include "isotrack/sampling/coordinate_descent.h"
 #include "isotrack/sampling/cover.h"
@@ -30,6 +31,7 @@ constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3;
 constexpr int kSizingSteps = 3, kCertifySteps = 6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
 constexpr int kCertifyRounds = 12, kRelaxedCertifyRounds = 4;
+constexpr int kFitSteps = 4;
 constexpr double kLeastSpacing = 0.05;  // resolutions: for shreds of a single voxel, where nothing coarser closes
 
 /// Adds the time from its construction to its destruction to a stage.
@@ -164,7 +166,20 @@ struct Tracker::Impl {
         std::size_t midpoint = 0;
         for (const int p : b.carved.particle)
             b.vertices.push_back(p >= 0 ? particles.position[p] : b.carved.midpoints[midpoint++]);
+        if (options.fit) fit_vertices(b, surface, seconds);
         return b;
+    }
+
+    void fit_vertices(Build& b, const Surface& surface, std::map<std::string, double>& seconds) {
+        const StageTimer timer(seconds, "fit");
+        const auto probe = surface.probe();
+        std::vector<Vec3> normals;
+        for (std::size_t v = 0; v < b.vertices.size(); ++v) {
+            const int p = b.carved.particle[v];
+            normals.push_back(p >= 0 ? particles.normal[p] : probe->normal(b.vertices[v]));
+        }
+        fit(b.vertices, b.carved.triangles, normals, surface, kFitSteps, kSizingSteps);
+        for (Vec3& v : b.vertices) v = v.cast<float>().cast<double>();
     }
 
     void size(const Build& b, const Surface& surface, const SizingLimits& l) {

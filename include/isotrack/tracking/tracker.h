@@ -35,6 +35,7 @@ struct TrackerOptions {
     std::optional<double> max_edge;      ///< Largest spacing. Unset: 40 times the surface's resolution.
     Method method = Method::Tolerance;
     Reconstruction reconstruction = Reconstruction::Guided;
+    bool fit = false;                    ///< Vertices leave the surface so that the triangles are nearer to it; particles stay.
     std::uint64_t seed = 1;              ///< Same seed, same surfaces: same meshes, at any thread count.
 };
 
