@@ -15,7 +15,7 @@ namespace isotrack {
 namespace {
 
 TEST(MeshTopology, CountsATetrahedron) {
-    const MeshTopology t = mesh_topology(test::tetrahedron());
+    const MeshTopology t = mesh_topology(support::tetrahedron());
     EXPECT_EQ(t.vertices, 4u);
     EXPECT_EQ(t.edges, 6u);
     EXPECT_EQ(t.triangles, 4u);
@@ -28,18 +28,18 @@ TEST(MeshTopology, CountsATetrahedron) {
 }
 
 TEST(MeshTopology, FindsTheGenusOfTori) {
-    const TriangleMesh torus = test::torus(12, 7);
+    const TriangleMesh torus = support::torus(12, 7);
     EXPECT_EQ(mesh_topology(torus).genus(), 1);
     EXPECT_EQ(mesh_topology(torus).edges, 3u * 12u * 7u);
-    const MeshTopology two = mesh_topology(test::join(torus, test::torus(5, 5)));
+    const MeshTopology two = mesh_topology(support::join(torus, support::torus(5, 5)));
     EXPECT_EQ(two.components, 2u);
     EXPECT_EQ(two.genus(), 2);
     EXPECT_TRUE(two.closed() && two.oriented() && two.manifold());
 }
 
 TEST(MeshTopology, FindsAnEdgeSharedByTwoTetrahedra) {
-    TriangleMesh mesh = test::join(test::tetrahedron(), test::tetrahedron());
-    mesh = test::weld(test::weld(mesh, 4, 0), 5, 1);
+    TriangleMesh mesh = support::join(support::tetrahedron(), support::tetrahedron());
+    mesh = support::weld(support::weld(mesh, 4, 0), 5, 1);
     const MeshTopology t = mesh_topology(mesh);
     EXPECT_EQ(t.complex_edges, 1u);
     EXPECT_EQ(t.pinched_vertices, 0u);  // the complex edge holds the triangles of its ends together
@@ -52,7 +52,7 @@ TEST(MeshTopology, FindsAnEdgeSharedByTwoTetrahedra) {
 
 TEST(MeshTopology, FindsAVertexSharedByTwoTetrahedra) {
     const MeshTopology t =
-        mesh_topology(test::weld(test::join(test::tetrahedron(), test::tetrahedron()), 4, 0));
+        mesh_topology(support::weld(support::join(support::tetrahedron(), support::tetrahedron()), 4, 0));
     EXPECT_EQ(t.pinched_vertices, 1u);
     EXPECT_EQ(t.complex_edges, 0u);
     EXPECT_EQ(t.components, 1u);
@@ -63,7 +63,7 @@ TEST(MeshTopology, FindsAVertexSharedByTwoTetrahedra) {
 }
 
 TEST(MeshTopology, FindsTheEdgesOfAFlippedFace) {
-    TriangleMesh mesh = test::tetrahedron();
+    TriangleMesh mesh = support::tetrahedron();
     std::swap(mesh.triangles[2][0], mesh.triangles[2][1]);
     const MeshTopology t = mesh_topology(mesh);
     EXPECT_EQ(t.flipped_edges, 3u);
@@ -90,7 +90,7 @@ TEST(MeshTopology, FindsTheBorderOfAnOpenFan) {
 }
 
 TEST(MeshTopology, SetsDegenerateTrianglesAside) {
-    TriangleMesh mesh = test::tetrahedron();
+    TriangleMesh mesh = support::tetrahedron();
     mesh.points.push_back(Vec3::Ones());
     mesh.triangles.push_back({0, 1, 1});
     mesh.triangles.push_back({4, 4, 4});
@@ -112,7 +112,7 @@ TEST(MeshTopology, FindsNothingInAnEmptyMesh) {
 }
 
 TEST(MeshTopology, RefusesIndicesOutsideTheMesh) {
-    TriangleMesh mesh = test::tetrahedron();
+    TriangleMesh mesh = support::tetrahedron();
     mesh.triangles[3][1] = 4;
     EXPECT_THROW(mesh_topology(mesh), InputError);
     mesh.triangles[3][1] = -1;
@@ -219,16 +219,16 @@ TEST(SmallestAngles, AreThoseOfKnownTriangles) {
 }
 
 TEST(EnclosedVolume, IsPositiveOutwardAndKeepsItsDigitsFarAway) {
-    EXPECT_NEAR(enclosed_volume(test::tetrahedron()), 1.0 / 6.0, 1e-16);
-    EXPECT_NEAR(enclosed_volume(test::tetrahedron(Vec3::Constant(1048576.0))), 1.0 / 6.0, 1e-16);
-    TriangleMesh inward = test::tetrahedron();
+    EXPECT_NEAR(enclosed_volume(support::tetrahedron()), 1.0 / 6.0, 1e-16);
+    EXPECT_NEAR(enclosed_volume(support::tetrahedron(Vec3::Constant(1048576.0))), 1.0 / 6.0, 1e-16);
+    TriangleMesh inward = support::tetrahedron();
     for (Triangle& t : inward.triangles) std::swap(t[0], t[1]);
     EXPECT_NEAR(enclosed_volume(inward), -1.0 / 6.0, 1e-16);
     EXPECT_EQ(enclosed_volume({}), 0.0);
 }
 
 TEST(EnclosedVolume, HasTheSameBitsAtAnyThreadCount) {
-    const TriangleMesh sphere = test::icosphere(5);
+    const TriangleMesh sphere = support::icosphere(5);
     const double many = enclosed_volume(sphere);
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     EXPECT_EQ(enclosed_volume(sphere), many);

@@ -64,9 +64,9 @@ const Pairs kNone, kBoth{{0, 1}};
 
 TEST(SelfIntersections, FindsNoneInEmbeddedMeshes) {
     EXPECT_EQ(self_intersections({}), kNone);
-    EXPECT_EQ(self_intersections(test::tetrahedron()), kNone);
-    EXPECT_EQ(self_intersections(test::icosphere(4)), kNone);
-    EXPECT_EQ(self_intersections(test::torus(150, 61)), kNone);  // several slabs
+    EXPECT_EQ(self_intersections(support::tetrahedron()), kNone);
+    EXPECT_EQ(self_intersections(support::icosphere(4)), kNone);
+    EXPECT_EQ(self_intersections(support::torus(150, 61)), kNone);  // several slabs
 }
 
 TEST(SelfIntersections, TreatsTrianglesWithoutCommonVertices) {
@@ -124,10 +124,10 @@ TEST(SelfIntersections, LeavesOutTrianglesWithoutArea) {
 }
 
 TEST(SelfIntersections, RefusesBrokenMeshes) {
-    TriangleMesh mesh = test::tetrahedron();
+    TriangleMesh mesh = support::tetrahedron();
     mesh.triangles[2][1] = 7;
     EXPECT_THROW(self_intersections(mesh), InputError);
-    mesh = test::tetrahedron();
+    mesh = support::tetrahedron();
     mesh.points[1].y() = std::numeric_limits<double>::quiet_NaN();
     EXPECT_THROW(self_intersections(mesh), InputError);
 }
@@ -165,15 +165,15 @@ TEST(SelfIntersections, AgreesWithConstructedIntersectionsRoundAVertex) {
 }
 
 TEST(SelfIntersections, AgreesWithConstructedIntersectionsOnCrossingSurfaces) {
-    const TriangleMesh mesh = test::join(test::icosphere(2), test::torus(16, 9, 0.9, 0.3));
+    const TriangleMesh mesh = support::join(support::icosphere(2), support::torus(16, 9, 0.9, 0.3));
     const Pairs pairs = self_intersections(mesh);
     EXPECT_GT(pairs.size(), 100u);
     EXPECT_EQ(pairs, intersections_by_construction(mesh));
 }
 
 TEST(SelfIntersections, FindsTheSamePairsWhereverTheSlabsAreCutAndAtAnyThreadCount) {
-    const TriangleMesh a = test::torus(120, 60), b = test::icosphere(4, Vec3(0.9, 0.3, 0.1), 0.7);
-    const Pairs pairs = self_intersections(test::join(a, b));
+    const TriangleMesh a = support::torus(120, 60), b = support::icosphere(4, Vec3(0.9, 0.3, 0.1), 0.7);
+    const Pairs pairs = self_intersections(support::join(a, b));
     EXPECT_GT(pairs.size(), 300u);
     EXPECT_TRUE(std::is_sorted(pairs.begin(), pairs.end()));
     for (const auto& [i, j] : pairs) {
@@ -181,9 +181,9 @@ TEST(SelfIntersections, FindsTheSamePairsWhereverTheSlabsAreCutAndAtAnyThreadCou
         EXPECT_GE(j, static_cast<int>(a.triangles.size()));
     }
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-    EXPECT_EQ(self_intersections(test::join(a, b)), pairs);
+    EXPECT_EQ(self_intersections(support::join(a, b)), pairs);
     // Long triangles cross many slabs; one is added through everything, along the axis that is cut.
-    TriangleMesh pierced = test::join(a, b);
+    TriangleMesh pierced = support::join(a, b);
     const int n = static_cast<int>(pierced.points.size());
     pierced.points.insert(pierced.points.end(), {{-3, 0.01, 0.02}, {3, 0.02, 0.03}, {3, 0.1, 0.2}});
     pierced.triangles.push_back({n, n + 1, n + 2});

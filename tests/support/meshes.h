@@ -8,7 +8,7 @@
 
 #include "isotrack/types.h"
 
-namespace isotrack::test {
+namespace isotrack::support {
 
 inline TriangleMesh tetrahedron(const Vec3& corner = Vec3::Zero(), double size = 1.0) {
     TriangleMesh mesh;
@@ -84,4 +84,4 @@ inline TriangleMesh icosphere(int rounds, const Vec3& centre = Vec3::Zero(), dou
     return mesh;
 }
 
-}  // namespace isotrack::test
+}  // namespace isotrack::support
