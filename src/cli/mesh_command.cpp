@@ -35,7 +35,7 @@ public:
         const bool bad = row.status == "failed" || row.status == "tolerance_not_met";
         if (terminal_ && bad) fmt::print(stderr, "\r\033[K");
         if (row.status == "failed")
-            spdlog::error("frame {}: {}", row.frame, row.message);
+            spdlog::error("{}", frames_ > 1 ? fmt::format("frame {}: {}", row.frame, row.message) : row.message);
         else if (bad)
             spdlog::warn("frame {}: {}", row.frame, row.message);
         if (spdlog::get_level() > spdlog::level::info) return;
@@ -76,10 +76,11 @@ void summarise(const RunReport& report, const std::string& output, double second
         error = std::max(error, row.max_error_vx);
         ++written;
     }
-    spdlog::info("{} meshes written to {}: {} to {} triangles, largest error {:.3f} voxels, {}; {:.1f} s", written, output, least, most, error,
+    if (written > 0)
+        spdlog::info("{} meshes written to {}: {} to {} triangles, largest error {:.3f} voxels, {}; {:.1f} s", written, output, least, most, error,
                  unsound == 0 ? "all closed, manifold and free of self-intersections" : fmt::format("{} not sound", unsound), seconds);
     if (missed > 0) spdlog::warn("{} frames missed the tolerance", missed);
-    if (failed > 0) spdlog::error("{} of {} frames failed", failed, report.frames.size());
+    if (failed > 0 && report.frames.size() > 1) spdlog::error("{} of {} frames failed", failed, report.frames.size());
 }
 
 int run(MeshArguments& a, const CLI::App& app, const std::string& command_line) {
@@ -147,6 +148,7 @@ void add_mesh_command(CLI::App& app, int& result) {
     mesh->add_option("--on-missing", a->options.on_missing, "A gap in the frame numbers: go on or refuse to start")
         ->transform(CLI::CheckedTransformer(on_missing).description(""))
         ->option_text("skip|stop [skip]");
+    mesh->add_flag("--fit", a->options.fit, "Move vertices off the surface so that the triangles are nearer to it: fewer triangles");
     mesh->add_option("--seed", a->options.seed, "Same seed, same meshes")->capture_default_str();
     mesh->add_option("--report", a->report, "Write run.json here: settings and one row per frame");
     auto* overwrite = mesh->add_flag("--overwrite", a->overwrite, "Replace meshes that exist");

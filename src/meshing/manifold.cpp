@@ -164,13 +164,20 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     for (std::size_t p = 0; p < points.size(); ++p)
         if (in_dt[p] && first_set[p] < 0) result.unused.push_back(static_cast<int>(p));
 
-    // Different edges between the same two output vertices: all but the first get a midpoint. `mates` keeps the pairs apart.
+    // Different edges between the same two output vertices: they get midpoints. `mates` keeps the pairs apart.
     if (result.complex_edges > 0) {
+        // Where that happens every edge over the same two particles is split, so that what touches keeps touching in whole edges.
         const auto edges = sorted_half_edges(result.triangles);
-        std::vector<std::array<int, 2>> to_split;  // triangle, corner
+        std::vector<std::pair<int, int>> ambiguous;
+        const auto particles_of = [&](const HalfEdge& e) { return std::minmax(result.particle[e.from], result.particle[e.to]); };
         for (std::size_t e = 1; e < edges.size(); ++e)
-            if (edges[e - 1].from == edges[e].from && edges[e - 1].to == edges[e].to && edges[e].from < edges[e].to)
-                to_split.push_back({edges[e].triangle, edges[e].corner});
+            if (edges[e - 1].from == edges[e].from && edges[e - 1].to == edges[e].to) ambiguous.emplace_back(particles_of(edges[e]));
+        std::sort(ambiguous.begin(), ambiguous.end());
+        std::vector<std::array<int, 2>> to_split;  // triangle, corner; each pair of mates once
+        for (const HalfEdge& e : edges)
+            if (e.triangle < mates[e.triangle][e.corner] &&
+                std::binary_search(ambiguous.begin(), ambiguous.end(), std::pair<int, int>(particles_of(e))))
+                to_split.push_back({e.triangle, e.corner});
         std::vector<std::array<int, 3>> midpoint(count, {-1, -1, -1});
         for (const auto& [t, k] : to_split) {
             const int a = result.triangles[t][(k + 1) % 3], b = result.triangles[t][(k + 2) % 3];

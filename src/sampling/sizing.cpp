@@ -49,7 +49,7 @@ double spacing_from_curvature(Surface::Probe& probe, const Vec3& p, const Vec3& 
     }
     // Error of an equilateral triangle on a sphere: kappa h^2 / 6.
     const double by_error = std::sqrt(6.0 * kShare * limits.tolerance / std::max(kappa, 1e-12));
-    const double by_angle = limits.angle / std::max(kappa, 1e-12);
+    const double by_angle = std::max(limits.angle / std::max(kappa, 1e-12), limits.angle_floor);
     return bounded(std::min(by_error, by_angle), limits);
 }
 
@@ -87,7 +87,7 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
         double h = std::exp(-0.5 * (missed ? std::max(mean, log_k2[i]) : mean));
         // 1 - cos t ~ t^2 / 2, so the curvature is sqrt(2) k_nd.
         const double kappa = std::sqrt(2.0) * normal_deviation(particles, adjacency, i);
-        if (kappa > 0.0) h = std::min(h, std::max(limits.angle / kappa, 0.7 * particles.spacing[i]));
+        if (kappa > 0.0) h = std::min(h, std::max({limits.angle / kappa, limits.angle_floor, 0.7 * particles.spacing[i]}));
         h = std::min(h, std::max(kThicknessShare * evidence.thickness[i], 0.7 * particles.spacing[i]));
         next[i] = bounded(h, limits);
     });

@@ -107,6 +107,7 @@ TrackerOptions tracker_options(const MeshSequenceOptions& options, double voxel_
     if (options.max_edge) result.max_edge = options.max_edge->in_world(voxel_size);
     result.method = options.method;
     result.reconstruction = options.reconstruction;
+    result.fit = options.fit;
     result.seed = options.seed;
     return result;
 }
@@ -125,6 +126,7 @@ std::map<std::string, std::string> effective_settings(const MeshSequenceOptions&
     s["angle"] = std::to_string(std::lround(t.angle_deg.value_or(default_angle_deg(t.method)))) + " degrees";
     s["method"] = options.method == Method::Paper ? "paper" : "tolerance";
     s["reconstruct"] = options.reconstruction == Reconstruction::Pure ? "pure" : "guided";
+    s["fit"] = options.fit ? "on" : "off";
     s["seed"] = std::to_string(options.seed);
     s["voxel_size"] = length(voxel_size);
     if (options.iso != 0.0) s["iso"] = std::to_string(options.iso);

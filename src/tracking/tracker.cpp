@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <unordered_set>
 
@@ -17,6 +15,7 @@
 #include "isotrack/meshing/convection.h"
 #include "isotrack/meshing/fit.h"
 #include "isotrack/meshing/manifold.h"
+#include "isotrack/meshing/self_intersections.h"
 #include "isotrack/sampling/coordinate_descent.h"
 #include "isotrack/sampling/cover.h"
 #include "isotrack/sampling/population.h"
@@ -32,6 +31,7 @@ constexpr int kSweepsPerRound = 3;
 constexpr int kSizingSteps = 3, kCertifySteps = 6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
 constexpr int kCertifyRounds = 12, kRelaxedCertifyRounds = 4;
 constexpr int kFitSteps = 4;
+constexpr double kAngleFloor = 2.0;  // resolutions: sharp edges are as round as the grid makes them
 constexpr double kLeastSpacing = 0.05;  // resolutions: for shreds of a single voxel, where nothing coarser closes
 
 /// Adds the time from its construction to its destruction to a stage.
@@ -52,7 +52,8 @@ struct Build {
     CarvedSurface carved;
     Adjacency adjacency;
     std::vector<double> thickness;
-    std::vector<Vec3> vertices;  ///< Of the carved surface.
+    std::vector<Vec3> vertices;     ///< Of the mesh: fitted when asked for.
+    std::vector<Vec3> on_surface;   ///< The same vertices before the fit.
 
     /// The triangles as particle indices, without those that stand on a midpoint.
     std::vector<Triangle> particle_triangles() const {
@@ -117,22 +118,55 @@ struct Tracker::Impl {
         SizingLimits l{};
         l.tolerance = options.tolerance;
         l.angle = options.angle_deg.value_or(default_angle_deg(options.method)) * kPi / 180.0;
+        l.angle_floor = kAngleFloor * surface.resolution();
         l.min_edge = options.min_edge.value_or(0.5 * surface.resolution());
         l.max_edge = std::max(options.max_edge.value_or(40.0 * surface.resolution()), l.min_edge);
         return l;
+    }
+
+    /// Where each particle is expected on the new surface. A velocity field may be in a unit nobody knows and a motion may have turned round, so
+    /// the guesses compete: the velocity field, the last displacement, standing still. The one that lands nearest to the surface wins, by its
+    /// median over the particles; an earlier one wins unless a later one is clearly better.
+    std::vector<Vec3> expected_positions(const Surface& surface, const Motion& motion) const {
+        constexpr std::size_t kVoters = 2000;
+        constexpr double kClearly = 0.8;
+        const std::size_t n = particles.size(), step = 1 + n / kVoters;
+        std::vector<std::vector<Vec3>> guesses;
+        if (motion) {
+            guesses.emplace_back(n);
+            tbb::parallel_for(std::size_t{0}, n, [&](std::size_t i) { guesses.back()[i] = motion(particles.position[i]); });
+        }
+        guesses.emplace_back(n);
+        for (std::size_t i = 0; i < n; ++i) guesses.back()[i] = particles.position[i] + particles.velocity[i];
+        guesses.push_back(particles.position);
+        const auto probe = surface.probe();
+        std::size_t winner = 0;
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t g = 0; g < guesses.size(); ++g) {
+            std::vector<double> distances;
+            for (std::size_t i = 0; i < n; i += step) distances.push_back(std::abs(probe->value(guesses[g][i])));
+            if (distances.empty()) break;
+            const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+            std::nth_element(distances.begin(), middle, distances.end());
+            if (*middle < kClearly * least) {
+                least = *middle;
+                winner = g;
+            }
+        }
+        return std::move(guesses[winner]);
     }
 
     /// Brings the particles to the new surface; drops those that find no way there or would change sides.
     std::size_t carry(const Surface& surface, const Motion& motion) {
         const std::size_t n = particles.size();
         std::vector<char> keep(n, 0);
+        const std::vector<Vec3> expected = expected_positions(surface, motion);
         tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 128), [&](const auto& range) {
             Surface::Probe& probe = *probes.local();
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
                 const Vec3 old = particles.position[i];
-                const Vec3 guess = motion ? motion(old) : Vec3(old + particles.velocity[i]);
-                for (const Vec3& start : {guess, old}) {
+                for (const Vec3& start : {expected[i], old}) {
                     const auto p = probe.project(start);
                     if (!p) continue;
                     const Vec3 n_new = probe.normal(*p);
@@ -165,7 +199,8 @@ struct Tracker::Impl {
         b.carved = carve(b.cells, labels, particles.position);
         std::size_t midpoint = 0;
         for (const int p : b.carved.particle)
-            b.vertices.push_back(p >= 0 ? particles.position[p] : b.carved.midpoints[midpoint++]);
+            b.vertices.push_back(p >= 0 ? particles.position[p] : Vec3(b.carved.midpoints[midpoint++].cast<float>().cast<double>()));
+        b.on_surface = b.vertices;
         if (options.fit) fit_vertices(b, surface, seconds);
         return b;
     }
@@ -180,6 +215,32 @@ struct Tracker::Impl {
         }
         fit(b.vertices, b.carved.triangles, normals, surface, kFitSteps, kSizingSteps);
         for (Vec3& v : b.vertices) v = v.cast<float>().cast<double>();
+    }
+
+    /// Puts fitted vertices back where their triangles cross others, a ring further each time, until none cross. Facets of a DT do not.
+    static void undo_crossing_fits(Build& b) {
+        TriangleMesh mesh;
+        mesh.triangles = b.carved.triangles;
+        std::vector<char> undo(b.vertices.size(), 0);
+        for (bool any = true; any;) {
+            mesh.points = b.vertices;
+            any = false;
+            const auto back = [&](int v) {
+                undo[v] = 1;
+                any = any || b.vertices[v] != b.on_surface[v];
+            };
+            for (const auto& pair : self_intersections(mesh))
+                for (const int t : {pair.first, pair.second})
+                    for (const int v : mesh.triangles[t]) back(v);
+            if (!any && std::count(undo.begin(), undo.end(), 1) == 0) break;
+            for (std::size_t v = 0; v < undo.size(); ++v)
+                if (undo[v]) b.vertices[v] = b.on_surface[v];
+            if (!any) break;
+            const std::vector<char> ring = undo;
+            for (const Triangle& t : mesh.triangles)
+                if (ring[t[0]] || ring[t[1]] || ring[t[2]])
+                    for (const int v : t) undo[v] = 1;
+        }
     }
 
     void size(const Build& b, const Surface& surface, const SizingLimits& l) {
@@ -213,7 +274,6 @@ struct Tracker::Impl {
             shortages.push_back({0.5 * (particles.position[p] + particles.position[q]),
                                  0.7 * std::min(particles.spacing[p], particles.spacing[q])});
         }
-        if (getenv("ISO_DEBUG")) std::fprintf(stderr, "  shortages: %zu complex %zu\n", shortages.size(), b.carved.complex_edges);
         const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
         return densify(particles, shortages, surface, least, next_id);
     }
@@ -280,19 +340,23 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
     else
         sample(surface, l, warm, frame);
     const std::vector<Surface::Crossing> crossings = surface.crossings();
-    Build b = build(surface, seconds);
+    const auto build_to_check = [&] {
+        Build built = build(surface, seconds);
+        const StageTimer timer(seconds, "certify");
+        if (options.fit) undo_crossing_fits(built);
+        return built;
+    };
+    Build b = build_to_check();
     const int certify_rounds = options.method == Method::Paper ? 0 : kCertifyRounds;
     for (int round = 0; round < certify_rounds; ++round) {
-        const StageTimer timer(seconds, "certify");
-        const std::size_t added = refine(b, surface, l, crossings);
-        if (getenv("ISO_DEBUG"))
-            std::fprintf(stderr, "certify %d: n %zu added %zu complex %zu pinched %zu unused %zu\n", round, particles.size(), added,
-                         b.carved.complex_edges, b.carved.pinched.size(), b.carved.unused.size());
+        std::size_t added = 0;
+        {
+            const StageTimer timer(seconds, "certify");
+            added = refine(b, surface, l, crossings);
+        }
         if (added == 0) break;
-        b = build(surface, seconds);
-        if (round >= kRelaxedCertifyRounds) continue;
-        frame.sweeps += relax(particles, b.adjacency, surface, 2);
-        b = build(surface, seconds);
+        if (round < kRelaxedCertifyRounds) frame.sweeps += relax(particles, build(surface, seconds).adjacency, surface, 2);
+        b = build_to_check();
     }
 
     const auto errors = triangle_errors(b.vertices, b.carved.triangles, surface, kCertifySteps);

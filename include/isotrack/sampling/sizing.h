@@ -14,6 +14,7 @@ struct SizingLimits {
     double tolerance;            ///< Largest distance between mesh and surface.
     double angle;                ///< Largest angle between the normals of neighbours.
     double min_edge, max_edge;   ///< The spacing stays between these.
+    double angle_floor = 0.0;    ///< The angle alone asks for no spacing below this: at a sharp edge it would never be met.
 };
 
 /// What the mesh of the last build says about each particle. One entry per particle.
