@@ -1,4 +1,5 @@
-// The subcommands. Each function adds one to `app`; when it is chosen it runs and leaves its exit code in `result`.
+// The subcommands. Each function adds one to `app`; when it is chosen it runs and leaves its exit code in
+// `result`.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -35,28 +35,33 @@ public:
         const bool bad = row.status == "failed" || row.status == "tolerance_not_met";
         if (terminal_ && bad) fmt::print(stderr, "\r\033[K");
         if (row.status == "failed")
-            spdlog::error("{}", frames_ > 1 ? fmt::format("frame {}: {}", row.frame, row.message) : row.message);
+            spdlog::error("{}",
+                          frames_ > 1 ? fmt::format("frame {}: {}", row.frame, row.message) : row.message);
         else if (bad)
             spdlog::warn("frame {}: {}", row.frame, row.message);
         if (spdlog::get_level() > spdlog::level::info) return;
         if (terminal_)
             bar();
         else if (!bad)
-            spdlog::log(spdlog::level::debug, "frame {}: {} triangles, error {:.3f} vx, {:.2f} s{}", row.frame, row.triangles, row.max_error_vx,
-                        row.seconds.count("total") ? row.seconds.at("total") : 0.0, row.status == "ok" ? "" : ", " + row.status);
+            spdlog::log(spdlog::level::debug, "frame {}: {} triangles, error {:.3f} vx, {:.2f} s{}",
+                        row.frame, row.triangles, row.max_error_vx,
+                        row.seconds.count("total") ? row.seconds.at("total") : 0.0,
+                        row.status == "ok" ? "" : ", " + row.status);
     }
     void clear() const {
         if (terminal_) fmt::print(stderr, "\r\033[K");
     }
-    double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    }
 
 private:
     void bar() const {
         constexpr std::size_t kWidth = 30;
         const std::size_t filled = kWidth * done_ / std::max<std::size_t>(1, frames_);
         const double left = seconds() / static_cast<double>(done_) * static_cast<double>(frames_ - done_);
-        fmt::print(stderr, "\r\033[K[{}{}] {}/{} frames, {:.0f} s left", std::string(filled, '#'), std::string(kWidth - filled, '.'), done_,
-                   frames_, left);
+        fmt::print(stderr, "\r\033[K[{}{}] {}/{} frames, {:.0f} s left", std::string(filled, '#'),
+                   std::string(kWidth - filled, '.'), done_, frames_, left);
     }
     std::size_t frames_, done_ = 0;
     std::chrono::steady_clock::time_point start_;
@@ -77,10 +82,14 @@ void summarise(const RunReport& report, const std::string& output, double second
         ++written;
     }
     if (written > 0)
-        spdlog::info("{} meshes written to {}: {} to {} triangles, largest error {:.3f} voxels, {}; {:.1f} s", written, output, least, most, error,
-                 unsound == 0 ? "all closed, manifold and free of self-intersections" : fmt::format("{} not sound", unsound), seconds);
+        spdlog::info("{} meshes written to {}: {} to {} triangles, largest error {:.3f} voxels, {}; {:.1f} s",
+                     written, output, least, most, error,
+                     unsound == 0 ? "all closed, manifold and free of self-intersections"
+                                  : fmt::format("{} not sound", unsound),
+                     seconds);
     if (missed > 0) spdlog::warn("{} frames missed the tolerance", missed);
-    if (failed > 0 && report.frames.size() > 1) spdlog::error("{} of {} frames failed", failed, report.frames.size());
+    if (failed > 0 && report.frames.size() > 1)
+        spdlog::error("{} of {} frames failed", failed, report.frames.size());
 }
 
 int run(MeshArguments& a, const CLI::App& app, const std::string& command_line) {
@@ -92,18 +101,22 @@ int run(MeshArguments& a, const CLI::App& app, const std::string& command_line) 
     if (app.count("--velocity-grid")) o.velocity_grid = a.velocity_grid;
     if (app.count("--angle")) o.angle_deg = a.angle;
     if (app.count("--fps")) o.fps = a.fps;
-    o.on_existing = a.overwrite ? OnExisting::Overwrite : a.skip_existing ? OnExisting::Skip : OnExisting::Refuse;
+    o.on_existing = a.overwrite       ? OnExisting::Overwrite
+                    : a.skip_existing ? OnExisting::Skip
+                                      : OnExisting::Refuse;
 
     const InputSequence input =
         a.frames.empty() ? find_frames(a.inputs) : find_frames(a.inputs, parse_frame_range(a.frames));
     if (!input.missing.empty() && o.on_missing == OnMissing::Skip)
-        spdlog::warn("{} frame numbers have no file, the first is {}", input.missing.size(), input.missing.front());
+        spdlog::warn("{} frame numbers have no file, the first is {}", input.missing.size(),
+                     input.missing.front());
 
     Progress progress(input.frames.size());
     MeshSequenceEvents events;
     events.started = [](const RunReport& report) {
         std::string line;
-        for (const auto& [name, value] : report.settings) line += (line.empty() ? "" : ", ") + name + " " + value;
+        for (const auto& [name, value] : report.settings)
+            line += (line.empty() ? "" : ", ") + name + " " + value;
         spdlog::info("{}", line);
     };
     events.finished = [&](const FrameReport& row) { progress.show(row); };
@@ -119,12 +132,19 @@ int run(MeshArguments& a, const CLI::App& app, const std::string& command_line) 
 
 void add_mesh_command(CLI::App& app, int& result) {
     auto a = std::make_shared<MeshArguments>();
-    CLI::App* mesh = app.add_subcommand("mesh", "Track level-set frames and write one adaptive, watertight mesh per frame");
-    mesh->add_option("input", a->inputs, "VDB files, a folder, or a quoted pattern with ####, %04d or {} for the frame number")->required();
-    mesh->add_option("-o,--output", a->output, "Mesh files, with #### for the frame number: .ply .obj .off .stl .vtk")->required();
-    mesh->add_option("--tolerance", a->tolerance, "Largest distance between mesh and level set, either way: 0.5vx (voxels) or world units")
+    CLI::App* mesh = app.add_subcommand(
+        "mesh", "Track level-set frames and write one adaptive, watertight mesh per frame");
+    mesh->add_option("input", a->inputs,
+                     "VDB files, a folder, or a quoted pattern with ####, %04d or {} for the frame number")
+        ->required();
+    mesh->add_option("-o,--output", a->output,
+                     "Mesh files, with #### for the frame number: .ply .obj .off .stl .vtk")
+        ->required();
+    mesh->add_option("--tolerance", a->tolerance,
+                     "Largest distance between mesh and level set, either way: 0.5vx (voxels) or world units")
         ->capture_default_str();
-    mesh->add_option("--angle", a->angle, "Wanted angle between neighbour normals, degrees (default 60, with --method paper 20)");
+    mesh->add_option("--angle", a->angle,
+                     "Wanted angle between neighbour normals, degrees (default 60, with --method paper 20)");
     mesh->add_option("--min-edge", a->min_edge, "Smallest particle spacing (default 0.5vx)");
     mesh->add_option("--max-edge", a->max_edge, "Largest particle spacing (default 40vx)");
     mesh->add_option("--frames", a->frames, "A:B or A:B:STEP, ends included");
@@ -136,8 +156,10 @@ void add_mesh_command(CLI::App& app, int& result) {
     mesh->add_option("--method", a->options.method, "How particles are spaced: tolerance or paper")
         ->transform(CLI::CheckedTransformer(methods).description(""))
         ->option_text("tolerance|paper [tolerance]");
-    const std::map<std::string, Reconstruction> reconstructions{{"guided", Reconstruction::Guided}, {"pure", Reconstruction::Pure}};
-    mesh->add_option("--reconstruct", a->options.reconstruction, "Convection guided by the level set, or of the particles alone")
+    const std::map<std::string, Reconstruction> reconstructions{{"guided", Reconstruction::Guided},
+                                                                {"pure", Reconstruction::Pure}};
+    mesh->add_option("--reconstruct", a->options.reconstruction,
+                     "Convection guided by the level set, or of the particles alone")
         ->transform(CLI::CheckedTransformer(reconstructions).description(""))
         ->option_text("guided|pure [guided]");
     const std::map<std::string, OnError> on_error{{"skip", OnError::Skip}, {"stop", OnError::Stop}};
@@ -145,14 +167,17 @@ void add_mesh_command(CLI::App& app, int& result) {
         ->transform(CLI::CheckedTransformer(on_error).description(""))
         ->option_text("skip|stop [skip]");
     const std::map<std::string, OnMissing> on_missing{{"skip", OnMissing::Skip}, {"stop", OnMissing::Stop}};
-    mesh->add_option("--on-missing", a->options.on_missing, "A gap in the frame numbers: go on or refuse to start")
+    mesh->add_option("--on-missing", a->options.on_missing,
+                     "A gap in the frame numbers: go on or refuse to start")
         ->transform(CLI::CheckedTransformer(on_missing).description(""))
         ->option_text("skip|stop [skip]");
-    mesh->add_flag("--fit", a->options.fit, "Move vertices off the surface so that the triangles are nearer to it: fewer triangles");
+    mesh->add_flag("--fit", a->options.fit,
+                   "Move vertices off the surface so that the triangles are nearer to it: fewer triangles");
     mesh->add_option("--seed", a->options.seed, "Same seed, same meshes")->capture_default_str();
     mesh->add_option("--report", a->report, "Write run.json here: settings and one row per frame");
     auto* overwrite = mesh->add_flag("--overwrite", a->overwrite, "Replace meshes that exist");
-    mesh->add_flag("--skip-existing", a->skip_existing, "Leave out frames whose mesh exists")->excludes(overwrite);
+    mesh->add_flag("--skip-existing", a->skip_existing, "Leave out frames whose mesh exists")
+        ->excludes(overwrite);
     mesh->callback([a, mesh, &result] {
         std::string line = "isotrack mesh";
         for (const auto* option : mesh->get_options())

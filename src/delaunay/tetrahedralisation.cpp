@@ -4,7 +4,6 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Triangulation_cell_base_with_info_3.h>
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
-
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -15,8 +14,10 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using VertexBase = CGAL::Triangulation_vertex_base_with_info_3<int, Kernel>;
-using CellBase = CGAL::Triangulation_cell_base_with_info_3<int, Kernel, CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
-using Delaunay = CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
+using CellBase =
+    CGAL::Triangulation_cell_base_with_info_3<int, Kernel, CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
+using Delaunay =
+    CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
 
 Tetrahedra flat_copy(const Delaunay& dt) {
     Tetrahedra result;
@@ -89,7 +90,8 @@ Tetrahedra tetrahedralise(const std::vector<Vec3>& points) {
     std::vector<std::pair<Kernel::Point_3, int>> numbered;
     numbered.reserve(points.size());
     for (std::size_t i = 0; i < points.size(); ++i)
-        numbered.emplace_back(Kernel::Point_3(points[i].x(), points[i].y(), points[i].z()), static_cast<int>(i));
+        numbered.emplace_back(Kernel::Point_3(points[i].x(), points[i].y(), points[i].z()),
+                              static_cast<int>(i));
     const Delaunay dt(numbered.begin(), numbered.end());
     return flat_copy(dt);
 }
@@ -122,7 +124,9 @@ Adjacency vertex_adjacency(const Tetrahedra& cells, std::size_t count) {
     return result;
 }
 
-const char* name_of(UpdateStrategy) { return "rebuild"; }
+const char* name_of(UpdateStrategy) {
+    return "rebuild";
+}
 
 std::unique_ptr<Tetrahedralisation> make_tetrahedralisation(UpdateStrategy) {
     return std::make_unique<RebuiltTetrahedralisation>();

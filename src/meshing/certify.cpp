@@ -10,6 +10,10 @@
 namespace isotrack {
 namespace {
 
+/// A triangle stands for a crossing when it faces the way the crossing leaves the inside, or nearly: the
+/// surface itself always does.
+constexpr double kFacing = -0.2;
+
 /// Squared distance from p to triangle abc [Ericson 2005, "Real-Time Collision Detection", 5.1.5].
 double squared_distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
     const Vec3 ab = b - a, ac = c - a, ap = p - a;
@@ -35,18 +39,21 @@ double squared_distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3&
 
 }  // namespace
 
-std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                                           const Surface& surface, int steps) {
+std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
+                                           const std::vector<Triangle>& triangles, const Surface& surface,
+                                           int steps) {
     std::vector<TriangleError> errors(triangles.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
         const auto probe = surface.probe();
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
-            const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]], &c = points[triangles[t][2]];
+            const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
+                       &c = points[triangles[t][2]];
             TriangleError& error = errors[t];
             int count = 0;
             for (int i = 0; i <= steps; ++i)
                 for (int j = 0; i + j <= steps; ++j) {
-                    const Vec3 p = a + (b - a) * (static_cast<double>(i) / steps) + (c - a) * (static_cast<double>(j) / steps);
+                    const Vec3 p = a + (b - a) * (static_cast<double>(i) / steps) +
+                                   (c - a) * (static_cast<double>(j) / steps);
                     const double e = std::abs(probe->value(p));
                     error.mean_square += e * e;
                     ++count;
@@ -61,22 +68,35 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points, cons
     return errors;
 }
 
-std::vector<double> crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+std::vector<double> crossing_distances(const std::vector<Vec3>& points,
+                                       const std::vector<Triangle>& triangles,
                                        const std::vector<Surface::Crossing>& crossings, double cutoff) {
     std::vector<double> result(crossings.size(), std::numeric_limits<double>::infinity());
     if (crossings.empty() || triangles.empty()) return result;
 
-    // Triangles are entered into the cells of a grid that their box, widened by the cutoff, touches; a crossing looks into its own cell.
+    // Triangles are entered into the cells of a grid that their box, widened by the cutoff, touches; a
+    // crossing looks into its own cell.
     Box box;
     for (const auto& c : crossings) box.extend(c.point);
     double mean_edge = 0.0;
     for (const auto& t : triangles) mean_edge += (points[t[0]] - points[t[1]]).norm();
-    const double cell_size = std::max({mean_edge / static_cast<double>(triangles.size()), 2.0 * cutoff, box.diagonal().norm() * 1e-6});
-    Eigen::Array<std::int64_t, 3, 1> size = (box.sizes() / cell_size).array().floor().cast<std::int64_t>() + 1;
+    const double cell_size = std::max(
+        {mean_edge / static_cast<double>(triangles.size()), 2.0 * cutoff, box.diagonal().norm() * 1e-6});
+    Eigen::Array<std::int64_t, 3, 1> size =
+        (box.sizes() / cell_size).array().floor().cast<std::int64_t>() + 1;
     const auto cell_of = [&](const Vec3& p) {
-        return Eigen::Array<std::int64_t, 3, 1>(((p - box.min()) / cell_size).array().floor().cast<std::int64_t>());
+        return Eigen::Array<std::int64_t, 3, 1>(
+            ((p - box.min()) / cell_size).array().floor().cast<std::int64_t>());
     };
-    const auto key_of = [&](std::int64_t x, std::int64_t y, std::int64_t z) { return (x * size[1] + y) * size[2] + z; };
+    const auto key_of = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+        return (x * size[1] + y) * size[2] + z;
+    };
+
+    std::vector<Vec3> normals(triangles.size());
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        const Vec3& a = points[triangles[t][0]];
+        normals[t] = (points[triangles[t][1]] - a).cross(points[triangles[t][2]] - a).normalized();
+    }
 
     struct Entry {
         std::int64_t key;
@@ -111,10 +131,12 @@ std::vector<double> crossing_distances(const std::vector<Vec3>& points, const st
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, queries.size(), 256), [&](const auto& range) {
         for (std::size_t q = range.begin(); q < range.end(); ++q) {
             const Vec3& p = crossings[queries[q].index].point;
+            const Vec3 outward = crossings[queries[q].index].outward.cast<double>();
             double least = std::numeric_limits<double>::infinity();
             auto it = std::lower_bound(entries.begin(), entries.end(), Entry{queries[q].key, -1});
             for (; it != entries.end() && it->key == queries[q].key; ++it) {
                 const auto& t = triangles[it->index];
+                if (normals[it->index].dot(outward) < kFacing) continue;
                 least = std::min(least, squared_distance(p, points[t[0]], points[t[1]], points[t[2]]));
             }
             if (least <= cutoff * cutoff) result[queries[q].index] = std::sqrt(least);

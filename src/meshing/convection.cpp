@@ -19,11 +19,13 @@ bool circumcentre(const Vec3& a, const Vec3& b, const Vec3& c, Vec3& centre) {
     const double volume6 = a.dot(bc);
     const double size = std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
     if (!(std::abs(volume6) > kFlatness * size * std::sqrt(size))) return false;
-    centre = (a.squaredNorm() * bc + b.squaredNorm() * c.cross(a) + c.squaredNorm() * a.cross(b)) / (2.0 * volume6);
+    centre = (a.squaredNorm() * bc + b.squaredNorm() * c.cross(a) + c.squaredNorm() * a.cross(b)) /
+             (2.0 * volume6);
     return true;
 }
 
-/// The facet through which the flow leaves a cell: the circumcentre lies beyond it. -1 when the cell holds its circumcentre.
+/// The facet through which the flow leaves a cell: the circumcentre lies beyond it. -1 when the cell holds
+/// its circumcentre.
 int flow_exit(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell) {
     const auto& v = cells.vertices[cell];
     for (int k = 0; k < 4; ++k) {
@@ -35,8 +37,8 @@ int flow_exit(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell
 
 }  // namespace
 
-CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
-                             const Surface& surface) {
+CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& points,
+                             const std::vector<Vec3>& normals, const Surface& surface) {
     CellLabels labels(cells.size(), kOutside);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells.size(), 512), [&](const auto& range) {
         const auto probe = surface.probe();
@@ -45,7 +47,8 @@ CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& p
             if (cells.is_infinite(static_cast<int>(c))) continue;
             bool one_sheet = true;
             for (int a = 0; a < 4; ++a)
-                for (int b = a + 1; b < 4; ++b) one_sheet = one_sheet && normals[v[a]].dot(normals[v[b]]) >= 0.0;
+                for (int b = a + 1; b < 4; ++b)
+                    one_sheet = one_sheet && normals[v[a]].dot(normals[v[b]]) >= 0.0;
             const Vec3& p0 = points[v[0]];
             const Vec3 e1 = points[v[1]] - p0, e2 = points[v[2]] - p0, e3 = points[v[3]] - p0;
             Vec3 place = 0.25 * (e1 + e2 + e3);
@@ -80,7 +83,9 @@ CellLabels pure_convection(const Tetrahedra& cells, const std::vector<Vec3>& poi
     for (std::size_t c = 0; c < cells.size(); ++c)
         if (cells.is_infinite(static_cast<int>(c))) labels[c] = kOutside;
     for (std::size_t c = 0; c < cells.size(); ++c)
-        if (labels[c] == kOutside) front.push_back({static_cast<int>(c), cells.index_of(static_cast<int>(c), Tetrahedra::kInfinite)});
+        if (labels[c] == kOutside)
+            front.push_back(
+                {static_cast<int>(c), cells.index_of(static_cast<int>(c), Tetrahedra::kInfinite)});
     while (!front.empty()) {
         const HalfFacet f = front.back();
         front.pop_back();
@@ -89,7 +94,9 @@ CellLabels pure_convection(const Tetrahedra& cells, const std::vector<Vec3>& poi
         const auto& v = cells.vertices[inner];
         const int apex = cells.mirror_index(f.cell, f.k);
         const auto& facet = Tetrahedra::kFacet[apex];
-        if (!in_diametral_ball(points[v[facet[0]]], points[v[facet[1]]], points[v[facet[2]]], points[v[apex]])) continue;
+        if (!in_diametral_ball(points[v[facet[0]]], points[v[facet[1]]], points[v[facet[2]]],
+                               points[v[apex]]))
+            continue;
         labels[inner] = kOutside;
         for (int k = 0; k < 4; ++k)
             if (k != apex) front.push_back({inner, k});

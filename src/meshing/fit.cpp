@@ -13,10 +13,12 @@ namespace {
 
 constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
 
-/// The triangles around each vertex: those of v are entries first[v] to first[v + 1] - 1, as 3 * triangle + corner.
+/// The triangles around each vertex: those of v are entries first[v] to first[v + 1] - 1, as 3 * triangle +
+/// corner.
 struct Corners {
     std::vector<int> first, corner;
-    Corners(std::size_t vertices, const std::vector<Triangle>& triangles) : first(vertices + 1, 0), corner(3 * triangles.size()) {
+    Corners(std::size_t vertices, const std::vector<Triangle>& triangles)
+        : first(vertices + 1, 0), corner(3 * triangles.size()) {
         for (const Triangle& t : triangles)
             for (const int v : t) ++first[v + 1];
         for (std::size_t v = 0; v < vertices; ++v) first[v + 1] += first[v];
@@ -28,8 +30,8 @@ struct Corners {
 
 }  // namespace
 
-void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, const std::vector<Vec3>& normals, const Surface& surface,
-         int steps, int lattice) {
+void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+         const std::vector<Vec3>& normals, const Surface& surface, int steps, int lattice) {
     const Corners corners(vertices.size(), triangles);
     std::vector<double> limit(vertices.size(), std::numeric_limits<double>::infinity());
     for (const Triangle& t : triangles)
@@ -46,12 +48,14 @@ void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, co
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
             Surface::Probe& probe = *probes.local();
             for (std::size_t t = range.begin(); t < range.end(); ++t) {
-                const Vec3 &a = vertices[triangles[t][0]], &b = vertices[triangles[t][1]], &c = vertices[triangles[t][2]];
+                const Vec3 &a = vertices[triangles[t][0]], &b = vertices[triangles[t][1]],
+                           &c = vertices[triangles[t][2]];
                 const double area = (b - a).cross(c - a).norm();
                 shares[t] = {};
                 for (int i = 0; i <= lattice; ++i)
                     for (int j = 0; i + j <= lattice; ++j) {
-                        const double u = static_cast<double>(i) / lattice, v = static_cast<double>(j) / lattice;
+                        const double u = static_cast<double>(i) / lattice,
+                                     v = static_cast<double>(j) / lattice;
                         const double w[3] = {1.0 - u - v, u, v};
                         const double value = probe.value(w[0] * a + w[1] * b + w[2] * c);
                         for (int k = 0; k < 3; ++k) {

@@ -8,7 +8,8 @@
 namespace isotrack {
 namespace {
 
-/// Disjoint sets of corners; the least member stands for its set, so the result does not depend on the order of the unions.
+/// Disjoint sets of corners; the least member stands for its set, so the result does not depend on the order
+/// of the unions.
 class CornerSets {
 public:
     explicit CornerSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
@@ -32,7 +33,8 @@ private:
 /// The boundary facets of the inside cells, and which one follows which around an edge.
 class Boundary {
 public:
-    Boundary(const Tetrahedra& cells, const CellLabels& labels) : cells_(cells), labels_(labels), number_(4 * cells.size(), -1) {
+    Boundary(const Tetrahedra& cells, const CellLabels& labels)
+        : cells_(cells), labels_(labels), number_(4 * cells.size(), -1) {
         for (std::size_t c = 0; c < cells.size(); ++c) {
             if (!labels[c]) continue;
             for (int k = 0; k < 4; ++k)
@@ -54,8 +56,9 @@ public:
     /// The facet on the other side of the edge opposite `corner`, by rotation through inside cells.
     int mate(int facet, int corner) const {
         int cell = facets_[facet].cell;
-        int cross = Tetrahedra::kFacet[facets_[facet].k][corner];  // the facet to cross next is opposite this vertex
-        int other = facets_[facet].k;                              // the remaining vertex off the edge
+        int cross =
+            Tetrahedra::kFacet[facets_[facet].k][corner];  // the facet to cross next is opposite this vertex
+        int other = facets_[facet].k;                      // the remaining vertex off the edge
         while (number_[4 * cell + cross] < 0) {
             const int next = cells_.neighbours[cell][cross];
             const int pivot = cells_.vertices[cell][other];
@@ -76,7 +79,9 @@ private:
 
 struct HalfEdge {
     int from, to, triangle, corner;  // the edge opposite `corner`
-    bool operator<(const HalfEdge& o) const { return std::tie(from, to, triangle) < std::tie(o.from, o.to, o.triangle); }
+    bool operator<(const HalfEdge& o) const {
+        return std::tie(from, to, triangle) < std::tie(o.from, o.to, o.triangle);
+    }
 };
 
 std::vector<HalfEdge> sorted_half_edges(const std::vector<Triangle>& triangles) {
@@ -109,7 +114,8 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
             }
         }
 
-    // The first corner set at a particle, in the order of the facets, is its own vertex; the others are copies.
+    // The first corner set at a particle, in the order of the facets, is its own vertex; the others are
+    // copies.
     CarvedSurface result;
     std::vector<int> first_set(points.size(), -1);
     std::vector<int> copies;
@@ -164,14 +170,19 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     for (std::size_t p = 0; p < points.size(); ++p)
         if (in_dt[p] && first_set[p] < 0) result.unused.push_back(static_cast<int>(p));
 
-    // Different edges between the same two output vertices: they get midpoints. `mates` keeps the pairs apart.
+    // Different edges between the same two output vertices: they get midpoints. `mates` keeps the pairs
+    // apart.
     if (result.complex_edges > 0) {
-        // Where that happens every edge over the same two particles is split, so that what touches keeps touching in whole edges.
+        // Where that happens every edge over the same two particles is split, so that what touches keeps
+        // touching in whole edges.
         const auto edges = sorted_half_edges(result.triangles);
         std::vector<std::pair<int, int>> ambiguous;
-        const auto particles_of = [&](const HalfEdge& e) { return std::minmax(result.particle[e.from], result.particle[e.to]); };
+        const auto particles_of = [&](const HalfEdge& e) {
+            return std::minmax(result.particle[e.from], result.particle[e.to]);
+        };
         for (std::size_t e = 1; e < edges.size(); ++e)
-            if (edges[e - 1].from == edges[e].from && edges[e - 1].to == edges[e].to) ambiguous.emplace_back(particles_of(edges[e]));
+            if (edges[e - 1].from == edges[e].from && edges[e - 1].to == edges[e].to)
+                ambiguous.emplace_back(particles_of(edges[e]));
         std::sort(ambiguous.begin(), ambiguous.end());
         std::vector<std::array<int, 2>> to_split;  // triangle, corner; each pair of mates once
         for (const HalfEdge& e : edges)
@@ -187,11 +198,13 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
             const int g = mates[t][k];
             midpoint[t][k] = m;
             for (int j = 0; j < 3; ++j)
-                if (mates[g][j] == t && result.triangles[g][(j + 1) % 3] == b && result.triangles[g][(j + 2) % 3] == a)
+                if (mates[g][j] == t && result.triangles[g][(j + 1) % 3] == b &&
+                    result.triangles[g][(j + 2) % 3] == a)
                     midpoint[g][j] = m;
         }
         for (std::size_t f = 0; f < count; ++f) {
-            // A triangle with midpoints on its edges, as a polygon, fanned from a midpoint: no two halves share an unsplit edge twice.
+            // A triangle with midpoints on its edges, as a polygon, fanned from a midpoint: no two halves
+            // share an unsplit edge twice.
             std::vector<int> polygon;
             int start = -1;
             for (int k = 0; k < 3; ++k) {

@@ -12,7 +12,8 @@ namespace isotrack {
 namespace {
 
 /// The paper's k_i (3.3.3) as a spacing.
-double spacing_in_paper(const Particles& particles, const std::vector<int>& neighbours, int i, const SizingLimits& limits) {
+double spacing_in_paper(const Particles& particles, const std::vector<int>& neighbours, int i,
+                        const SizingLimits& limits) {
     double k_nd2 = 0.0, th2 = std::numeric_limits<double>::infinity();
     for (const int j : neighbours) {
         const double cosine = particles.normal[i].dot(particles.normal[j]);
@@ -30,8 +31,9 @@ double spacing_in_paper(const Particles& particles, const std::vector<int>& neig
 
 }  // namespace
 
-CoordinateDescentReport coordinate_descent(Particles& particles, MovingNeighbours& structure, const Surface& surface,
-                                           const SizingLimits& limits, Id& next_id, const CoordinateDescentOptions& options) {
+CoordinateDescentReport coordinate_descent(Particles& particles, MovingNeighbours& structure,
+                                           const Surface& surface, const SizingLimits& limits, Id& next_id,
+                                           const CoordinateDescentOptions& options) {
     CoordinateDescentReport report;
     const auto probe = surface.probe();
     std::mt19937_64 random(options.seed);
@@ -61,7 +63,8 @@ CoordinateDescentReport coordinate_descent(Particles& particles, MovingNeighbour
         ++report.steps;
         structure.neighbours(i, neighbours);
         particles.spacing[i] = spacing_in_paper(particles, neighbours, i, limits);
-        const DescentStep step = descend(particles, {neighbours.data(), neighbours.data() + neighbours.size()}, i, lambda[i], *probe);
+        const DescentStep step = descend(
+            particles, {neighbours.data(), neighbours.data() + neighbours.size()}, i, lambda[i], *probe);
         if (step.moved > 0.0) structure.moved(i, particles.position[i]);
         if (step.moved > kRestThreshold) {
             push(i);
@@ -81,7 +84,8 @@ CoordinateDescentReport coordinate_descent(Particles& particles, MovingNeighbour
             const double angle = std::uniform_real_distribution<double>(0.0, 6.283185307179586)(random);
             const Vec3& n = particles.normal[i];
             const Vec3 a = n.unitOrthogonal(), side = std::cos(angle) * a + std::sin(angle) * n.cross(a);
-            const auto p = probe->project(particles.position[i] + 0.5 * step.sigma * particles.spacing[i] * side);
+            const auto p =
+                probe->project(particles.position[i] + 0.5 * step.sigma * particles.spacing[i] * side);
             if (!p) continue;
             const int twin = static_cast<int>(particles.size());
             particles.add(*p, probe->normal(*p), particles.spacing[i], next_id++, particles.velocity[i]);

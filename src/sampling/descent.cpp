@@ -6,7 +6,7 @@
 namespace isotrack {
 namespace {
 
-constexpr int kTrials = 5;           // of lambda within one step
+constexpr int kTrials = 5;  // of lambda within one step
 constexpr int kMostNeighbours = 64;
 
 struct Neighbour {
@@ -44,7 +44,8 @@ struct Surroundings {
 
     double energy(const Vec3& p) const {
         double e = 0.0;
-        for (int a = 0; a < count; ++a) e += std::exp(-list[a].scale2 * (list[a].position - p).squaredNorm() / sigma2);
+        for (int a = 0; a < count; ++a)
+            e += std::exp(-list[a].scale2 * (list[a].position - p).squaredNorm() / sigma2);
         return e;
     }
 };
@@ -59,7 +60,8 @@ void tangent_frame(const Vec3& n, Vec3& a, Vec3& b) {
 
 }  // namespace
 
-DescentStep descend(Particles& particles, Adjacency::Range neighbours, int i, double& lambda, Surface::Probe& probe) {
+DescentStep descend(Particles& particles, Adjacency::Range neighbours, int i, double& lambda,
+                    Surface::Probe& probe) {
     const Surroundings near(particles, neighbours, i);
     if (near.count == 0 || !(near.sigma2 > 0.0)) return {};
     const double sigma = std::sqrt(near.sigma2);
@@ -68,8 +70,8 @@ DescentStep descend(Particles& particles, Adjacency::Range neighbours, int i, do
     Vec3 a, b;
     tangent_frame(n, a, b);
 
-    // Gradient and Hessian of the tangential energy F_i (appendix 1, with the sign of the gradient put right: it points away from where
-    // the energy falls, towards the neighbours).
+    // Gradient and Hessian of the tangential energy F_i (appendix 1, with the sign of the gradient put right:
+    // it points away from where the energy falls, towards the neighbours).
     double g1 = 0.0, g2 = 0.0, h11 = 0.0, h12 = 0.0, h22 = 0.0;
     for (int j = 0; j < near.count; ++j) {
         const Vec3 r = near.list[j].position - p;

@@ -29,6 +29,8 @@ void Particles::retain(const std::vector<char>& keep) {
     compact(velocity, keep);
 }
 
-void Particles::clear() { *this = {}; }
+void Particles::clear() {
+    *this = {};
+}
 
 }  // namespace isotrack

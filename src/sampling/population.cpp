@@ -9,7 +9,8 @@
 
 namespace isotrack {
 
-std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency, const PopulationBand& band) {
+std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency,
+                            const PopulationBand& band) {
     std::vector<std::pair<double, int>> crowded;
     for (std::size_t i = 0; i < particles.size(); ++i) {
         double q = 1e300;
@@ -30,12 +31,13 @@ std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacen
     return keep;
 }
 
-std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& triangles, const Surface& surface, Id& next_id,
-                        const PopulationBand& band) {
+std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& triangles, const Surface& surface,
+                        Id& next_id, const PopulationBand& band) {
     std::vector<std::pair<double, int>> large;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         const auto& [a, b, c] = triangles[t];
-        const Vec3 u = particles.position[b] - particles.position[a], v = particles.position[c] - particles.position[a];
+        const Vec3 u = particles.position[b] - particles.position[a],
+                   v = particles.position[c] - particles.position[a];
         const double area2 = u.cross(v).norm();
         if (!(area2 > 0.0)) continue;
         const double radius = u.norm() * v.norm() * (u - v).norm() / (2.0 * area2);
@@ -49,7 +51,8 @@ std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& trian
     for (const auto& [ratio, t] : large) {
         const auto& [a, b, c] = triangles[t];
         if (touched[a] || touched[b] || touched[c]) continue;
-        const Vec3 pa = particles.position[a], u = particles.position[b] - pa, v = particles.position[c] - pa, w = u.cross(v);
+        const Vec3 pa = particles.position[a], u = particles.position[b] - pa, v = particles.position[c] - pa,
+                   w = u.cross(v);
         const double h = (particles.spacing[a] + particles.spacing[b] + particles.spacing[c]) / 3.0;
         // An obtuse triangle has its circumcentre far outside: stay within one spacing.
         Vec3 centre = (u.squaredNorm() * v.cross(w) + v.squaredNorm() * w.cross(u)) / (2.0 * w.squaredNorm());
@@ -67,12 +70,13 @@ std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& trian
     return added;
 }
 
-std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface, double min_spacing,
-                    Id& next_id) {
+std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface,
+                    double min_spacing, Id& next_id) {
     constexpr double kApart = 0.5, kShrink = 0.6;
     if (shortages.empty()) return 0;
     PointGrid grid(2.0 * surface.resolution());
-    for (std::size_t i = 0; i < particles.size(); ++i) grid.insert(particles.position[i], static_cast<int>(i));
+    for (std::size_t i = 0; i < particles.size(); ++i)
+        grid.insert(particles.position[i], static_cast<int>(i));
     std::vector<char> shrunk(particles.size(), 0);
     const auto probe = surface.probe();
     std::size_t changes = 0;

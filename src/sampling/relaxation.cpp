@@ -30,7 +30,8 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
                 Surface::Probe& probe = *probes.local();
                 for (std::size_t g = range.begin(); g < range.end(); ++g) {
                     const int i = group[g];
-                    moved[i] = active[i] && descend(particles, adjacency.of(i), i, lambda[i], probe).moved > kRestThreshold;
+                    moved[i] = active[i] && descend(particles, adjacency.of(i), i, lambda[i], probe).moved >
+                                                kRestThreshold;
                 }
             });
     }

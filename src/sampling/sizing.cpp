@@ -8,8 +8,8 @@
 namespace isotrack {
 namespace {
 
-constexpr double kShare = 0.72;        // of the tolerance, aimed at by the largest error around a particle
-constexpr double kGradation = 0.25;    // growth of the spacing per distance
+constexpr double kShare = 0.72;      // of the tolerance, aimed at by the largest error around a particle
+constexpr double kGradation = 0.25;  // growth of the spacing per distance
 constexpr int kGradationPasses = 3;
 constexpr double kThicknessShare = 0.9;
 
@@ -27,7 +27,8 @@ void limit_gradation(Particles& particles, const Adjacency& adjacency) {
             double h = particles.spacing[i];
             for (const int j : adjacency.of(i)) {
                 if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
-                h = std::min(h, particles.spacing[j] + kGradation * (particles.position[j] - particles.position[i]).norm());
+                h = std::min(h, particles.spacing[j] +
+                                    kGradation * (particles.position[j] - particles.position[i]).norm());
             }
             next[i] = h;
         });
@@ -35,12 +36,16 @@ void limit_gradation(Particles& particles, const Adjacency& adjacency) {
     }
 }
 
-double bounded(double h, const SizingLimits& limits) { return std::clamp(h, limits.min_edge, limits.max_edge); }
+double bounded(double h, const SizingLimits& limits) {
+    return std::clamp(h, limits.min_edge, limits.max_edge);
+}
 
 }  // namespace
 
-double spacing_from_curvature(Surface::Probe& probe, const Vec3& p, const Vec3& n, double resolution, const SizingLimits& limits) {
-    // Curvature of the normal sections along two tangents, from normals two resolutions apart; the larger one counts.
+double spacing_from_curvature(Surface::Probe& probe, const Vec3& p, const Vec3& n, double resolution,
+                              const SizingLimits& limits) {
+    // Curvature of the normal sections along two tangents, from normals two resolutions apart; the larger one
+    // counts.
     const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
     double kappa = 0.0;
     for (const Vec3& t : {a, b, Vec3((a + b).normalized()), Vec3((a - b).normalized())}) {
@@ -64,7 +69,8 @@ double normal_deviation(const Particles& particles, const Adjacency& adjacency, 
     return std::sqrt(k2);
 }
 
-void update_spacing(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence, const SizingLimits& limits) {
+void update_spacing(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence,
+                    const SizingLimits& limits) {
     const std::size_t n = particles.size();
     std::vector<double> log_k2(n);
     for_each_particle(n, [&](std::size_t i) {
@@ -87,7 +93,8 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
         double h = std::exp(-0.5 * (missed ? std::max(mean, log_k2[i]) : mean));
         // 1 - cos t ~ t^2 / 2, so the curvature is sqrt(2) k_nd.
         const double kappa = std::sqrt(2.0) * normal_deviation(particles, adjacency, i);
-        if (kappa > 0.0) h = std::min(h, std::max({limits.angle / kappa, limits.angle_floor, 0.7 * particles.spacing[i]}));
+        if (kappa > 0.0)
+            h = std::min(h, std::max({limits.angle / kappa, limits.angle_floor, 0.7 * particles.spacing[i]}));
         h = std::min(h, std::max(kThicknessShare * evidence.thickness[i], 0.7 * particles.spacing[i]));
         next[i] = bounded(h, limits);
     });

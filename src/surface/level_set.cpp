@@ -25,7 +25,9 @@ constexpr double kFarVoxels = 10.0;        // values are clamped to this many vo
 constexpr int kCapLayers = 4;              // voxels added beyond a block whose border cuts the surface
 constexpr int kLeafDim = Leaf::DIM;
 
-Vec3 to_eigen(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
+Vec3 to_eigen(const openvdb::Vec3d& v) {
+    return {v.x(), v.y(), v.z()};
+}
 
 std::string grid_label(const openvdb::GridBase& grid) {
     return grid.getName().empty() ? "unnamed grid" : "grid '" + grid.getName() + "'";
@@ -56,8 +58,8 @@ struct AffineMap {
     Vec3 gradient_to_world(const Vec3& index_gradient) const { return inverse.transpose() * index_gradient; }
 };
 
-/// Values around one lattice cell. The cell's corners are (0..1)^3; the values one further out in each axis are those that the
-/// central differences at the corners need.
+/// Values around one lattice cell. The cell's corners are (0..1)^3; the values one further out in each axis
+/// are those that the central differences at the corners need.
 class Stencil {
 public:
     explicit Stencil(const FloatTree& tree) : accessor_(tree) {}
@@ -72,7 +74,8 @@ public:
         for (int i = 0; i < 2; ++i)
             for (int j = 0; j < 2; ++j)
                 for (int k = 0; k < 2; ++k)
-                    v[i][j][k] = leaf ? leaf->getValue(offset(x + i, y + j, z + k)) : accessor_.getValue(base.offsetBy(i, j, k));
+                    v[i][j][k] = leaf ? leaf->getValue(offset(x + i, y + j, z + k))
+                                      : accessor_.getValue(base.offsetBy(i, j, k));
         const auto mix = [](double a, double b, double s) { return a + s * (b - a); };
         double planes[2];
         for (int i = 0; i < 2; ++i)
@@ -104,10 +107,13 @@ public:
     }
 
 private:
-    static openvdb::Index offset(int x, int y, int z) { return (x << (2 * Leaf::LOG2DIM)) + (y << Leaf::LOG2DIM) + z; }
+    static openvdb::Index offset(int x, int y, int z) {
+        return (x << (2 * Leaf::LOG2DIM)) + (y << Leaf::LOG2DIM) + z;
+    }
 
     static Coord split(const Vec3& index, Vec3& t) {
-        // Points far outside any grid, or not finite, read the background at a corner of the representable range.
+        // Points far outside any grid, or not finite, read the background at a corner of the representable
+        // range.
         constexpr double kLimit = 1 << 30;
         Coord base;
         for (int axis = 0; axis < 3; ++axis) {
@@ -156,7 +162,8 @@ struct CrossedEdge {
     }
 };
 
-/// Every edge with a sign change, leaf by leaf. Edges between two tiles are not seen: a level set has voxels at its surface.
+/// Every edge with a sign change, leaf by leaf. Edges between two tiles are not seen: a level set has voxels
+/// at its surface.
 std::vector<CrossedEdge> find_crossings(const FloatTree& tree) {
     const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
     std::vector<std::vector<CrossedEdge>> per_leaf(leaves.leafCount());
@@ -170,7 +177,8 @@ std::vector<CrossedEdge> find_crossings(const FloatTree& tree) {
             const auto add = [&](const Coord& from, int axis, float a, float b) {
                 if ((a < 0.0f) == (b < 0.0f)) return;
                 const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
-                const bool border = !accessor.isValueOn(from) || !accessor.isValueOn(from.offsetBy(axis == 0, axis == 1, axis == 2));
+                const bool border = !accessor.isValueOn(from) ||
+                                    !accessor.isValueOn(from.offsetBy(axis == 0, axis == 1, axis == 2));
                 found.push_back({from, axis, fraction, a < 0.0f, border});
             };
             constexpr int kStride[3] = {kLeafDim * kLeafDim, kLeafDim, 1};
@@ -212,8 +220,10 @@ std::vector<CrossedEdge> find_crossings(const FloatTree& tree) {
     return all;
 }
 
-/// Median length of the world gradient at the surface, away from the border; 0 when there is nothing to measure.
-double slope_at_surface(const FloatTree& tree, const AffineMap& map, const std::vector<CrossedEdge>& crossings) {
+/// Median length of the world gradient at the surface, away from the border; 0 when there is nothing to
+/// measure.
+double slope_at_surface(const FloatTree& tree, const AffineMap& map,
+                        const std::vector<CrossedEdge>& crossings) {
     constexpr std::size_t kSamples = 4000;
     Stencil stencil(tree);
     std::vector<double> slopes;
@@ -238,26 +248,30 @@ double value_scale_for(double slope, double voxel_size) {
     return 1.0 / slope;
 }
 
-/// A float copy with `sign * (value - iso)`, active tiles turned into voxels, and no value that is not finite.
+/// A float copy with `sign * (value - iso)`, active tiles turned into voxels, and no value that is not
+/// finite.
 template <typename GridType>
 FloatGrid::Ptr float_copy(const GridType& source, double iso, double sign) {
     using Value = typename GridType::ValueType;
     const auto convert = [=](Value v) {
         const double shifted = sign * (static_cast<double>(v) - iso);
         if (std::isnan(shifted)) return std::numeric_limits<float>::max();
-        return static_cast<float>(std::clamp<double>(shifted, std::numeric_limits<float>::lowest(), std::numeric_limits<float>::max()));
+        return static_cast<float>(std::clamp<double>(shifted, std::numeric_limits<float>::lowest(),
+                                                     std::numeric_limits<float>::max()));
     };
     const auto voxels = source.deepCopy();
     voxels->tree().voxelizeActiveTiles();
     auto copy = FloatGrid::create(convert(source.background()));
     copy->setTransform(source.transform().copy());
-    copy->setTree(std::make_shared<FloatTree>(voxels->tree(), convert(source.background()), openvdb::TopologyCopy()));
+    copy->setTree(
+        std::make_shared<FloatTree>(voxels->tree(), convert(source.background()), openvdb::TopologyCopy()));
     const auto source_accessor = source.getConstAccessor();
     openvdb::tree::LeafManager<FloatTree> leaves(copy->tree());
-    leaves.foreach([&](Leaf& leaf, std::size_t) {
+    leaves.foreach ([&](Leaf& leaf, std::size_t) {
         auto reader = source.getConstUnsafeAccessor();
         float* data = leaf.buffer().data();
-        for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) data[i] = convert(reader.getValue(leaf.offsetToGlobalCoord(i)));
+        for (openvdb::Index i = 0; i < Leaf::SIZE; ++i)
+            data[i] = convert(reader.getValue(leaf.offsetToGlobalCoord(i)));
     });
     // Inactive tiles keep the sign they had.
     for (auto tile = copy->tree().beginValueOff(); tile; ++tile)
@@ -265,10 +279,11 @@ FloatGrid::Ptr float_copy(const GridType& source, double iso, double sign) {
     return copy;
 }
 
-/// A dense block whose background says nothing: adds voxels around it so that the surface goes straight on past the block's last voxels
-/// and is cut by a flat cap one voxel beyond them.
+/// A dense block whose background says nothing: adds voxels around it so that the surface goes straight on
+/// past the block's last voxels and is cut by a flat cap one voxel beyond them.
 void cap_block(FloatGrid& grid, const openvdb::CoordBBox& block, double voxel) {
-    const auto outer = openvdb::CoordBBox(block.min().offsetBy(-kCapLayers), block.max().offsetBy(kCapLayers));
+    const auto outer =
+        openvdb::CoordBBox(block.min().offsetBy(-kCapLayers), block.max().offsetBy(kCapLayers));
     const FloatGrid::ConstPtr inside = grid.deepCopy();
     auto accessor = grid.getAccessor();
     const auto reader = inside->getConstAccessor();
@@ -279,7 +294,8 @@ void cap_block(FloatGrid& grid, const openvdb::CoordBBox& block, double voxel) {
         // Distance to the cap in voxels: negative in front of it.
         int depth = std::numeric_limits<int>::min();
         for (int axis = 0; axis < 3; ++axis) {
-            const int past_top = (*c)[axis] - block.max()[axis] - 1, past_bottom = block.min()[axis] - 1 - (*c)[axis];
+            const int past_top = (*c)[axis] - block.max()[axis] - 1,
+                      past_bottom = block.min()[axis] - 1 - (*c)[axis];
             depth = std::max({depth, past_top, past_bottom});
         }
         const float cap = static_cast<float>(depth * voxel);
@@ -303,12 +319,15 @@ struct LevelSet::Impl {
         const auto floats = openvdb::gridConstPtrCast<FloatGrid>(source);
         const auto doubles = openvdb::gridConstPtrCast<openvdb::DoubleGrid>(source);
         if (!floats && !doubles)
-            throw InputError(grid_label(*source) + " holds " + source->valueType() + " values, not float or double distances");
+            throw InputError(grid_label(*source) + " holds " + source->valueType() +
+                             " values, not float or double distances");
         active_voxels = source->activeVoxelCount();
         const auto grid_class = source->getGridClass();
         const bool fog = grid_class == openvdb::GRID_FOG_VOLUME;
         if (fog && options.iso == 0.0)
-            throw InputError(grid_label(*source) + " is a fog volume, not a level set; give the density of the surface as iso value");
+            throw InputError(
+                grid_label(*source) +
+                " is a fog volume, not a level set; give the density of the surface as iso value");
         if (active_voxels == 0 && grid_class != openvdb::GRID_LEVEL_SET)
             throw InputError(grid_label(*source) + " has no voxels and is of class '" +
                              openvdb::GridBase::gridClassToString(grid_class) + "', not a level set");
@@ -325,11 +344,13 @@ struct LevelSet::Impl {
 
         std::vector<CrossedEdge> found = find_crossings(grid->constTree());
         if (found.empty() && active_voxels > 0 && grid_class != openvdb::GRID_LEVEL_SET)
-            throw InputError(grid_label(*source) + " is not a level set: its values do not change sign around " +
-                             std::to_string(options.iso) + " (class '" +
-                             openvdb::GridBase::gridClassToString(grid_class) + "'); give an iso value inside its range");
+            throw InputError(
+                grid_label(*source) + " is not a level set: its values do not change sign around " +
+                std::to_string(options.iso) + " (class '" + openvdb::GridBase::gridClassToString(grid_class) +
+                "'); give an iso value inside its range");
         scale = value_scale_for(slope_at_surface(grid->constTree(), map, found), map.voxel_size);
-        border_crossings = static_cast<std::size_t>(std::count_if(found.begin(), found.end(), [](const auto& c) { return c.at_border; }));
+        border_crossings = static_cast<std::size_t>(
+            std::count_if(found.begin(), found.end(), [](const auto& c) { return c.at_border; }));
 
         if (!own && scale != 1.0) grid = own = floats->deepCopy();
         if (own) {
@@ -349,12 +370,14 @@ struct LevelSet::Impl {
     /// A float grid that can be sampled as it is, once its values are known to be world distances.
     static bool is_plain(const FloatGrid& grid) {
         const float background = grid.background();
-        if (!(background > 0.0f) || !std::isfinite(background) || grid.tree().activeTileCount() > 0) return false;
+        if (!(background > 0.0f) || !std::isfinite(background) || grid.tree().activeTileCount() > 0)
+            return false;
         openvdb::tree::LeafManager<const FloatTree> leaves(grid.constTree());
         std::atomic<bool> finite{true};
-        leaves.foreach([&](const Leaf& leaf, std::size_t) {
+        leaves.foreach ([&](const Leaf& leaf, std::size_t) {
             const float* data = leaf.buffer().data();
-            float sum = 0.0f;  // stays finite unless a value is not; leaves hold too few values to overflow otherwise
+            float sum =
+                0.0f;  // stays finite unless a value is not; leaves hold too few values to overflow otherwise
             for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) sum += data[i] * 0.0f;
             if (!(sum == 0.0f)) finite = false;
         });
@@ -369,7 +392,7 @@ struct LevelSet::Impl {
         // Zero stays zero and means outside: a block's background of 0 is mended below.
         const auto convert = [=](float v) { return std::clamp(v * factor, -far, far); };
         openvdb::tree::LeafManager<FloatTree> leaves(own.tree());
-        leaves.foreach([&](Leaf& leaf, std::size_t) {
+        leaves.foreach ([&](Leaf& leaf, std::size_t) {
             float* data = leaf.buffer().data();
             for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) data[i] = convert(data[i]);
         });
@@ -430,15 +453,35 @@ LevelSet::~LevelSet() = default;
 std::unique_ptr<Surface::Probe> LevelSet::probe() const {
     return std::make_unique<GridProbe>(impl_->grid->constTree(), impl_->map);
 }
-double LevelSet::resolution() const { return impl_->map.voxel_size; }
-double LevelSet::reach() const { return impl_->reach; }
-Box LevelSet::bounds() const { return impl_->bounds; }
-std::vector<Surface::Crossing> LevelSet::crossings() const { return impl_->crossings; }
-bool LevelSet::empty() const { return impl_->crossings.empty(); }
-std::size_t LevelSet::active_voxels() const { return impl_->active_voxels; }
-double LevelSet::value_scale() const { return impl_->scale; }
-std::size_t LevelSet::crossing_count() const { return impl_->crossings.size(); }
-std::size_t LevelSet::border_crossings() const { return impl_->border_crossings; }
-openvdb::FloatGrid::ConstPtr LevelSet::grid() const { return impl_->grid; }
+double LevelSet::resolution() const {
+    return impl_->map.voxel_size;
+}
+double LevelSet::reach() const {
+    return impl_->reach;
+}
+Box LevelSet::bounds() const {
+    return impl_->bounds;
+}
+std::vector<Surface::Crossing> LevelSet::crossings() const {
+    return impl_->crossings;
+}
+bool LevelSet::empty() const {
+    return impl_->crossings.empty();
+}
+std::size_t LevelSet::active_voxels() const {
+    return impl_->active_voxels;
+}
+double LevelSet::value_scale() const {
+    return impl_->scale;
+}
+std::size_t LevelSet::crossing_count() const {
+    return impl_->crossings.size();
+}
+std::size_t LevelSet::border_crossings() const {
+    return impl_->border_crossings;
+}
+openvdb::FloatGrid::ConstPtr LevelSet::grid() const {
+    return impl_->grid;
+}
 
 }  // namespace isotrack

@@ -64,7 +64,8 @@ std::vector<Surface::Crossing> Surface::crossings() const {
     const auto cross = [&](double a, double b, const Vec3& at, int axis) {
         if ((a < 0.0) == (b < 0.0)) return;
         const float direction = a < 0.0 ? 1.0f : -1.0f;
-        result.push_back({at + h * (a / (a - b)) * Vec3::Unit(axis), direction * Eigen::Vector3f::Unit(axis)});
+        result.push_back(
+            {at + h * (a / (a - b)) * Vec3::Unit(axis), direction * Eigen::Vector3f::Unit(axis)});
     };
     fill(0, next);
     for (int x = 0; x < n.x(); ++x) {

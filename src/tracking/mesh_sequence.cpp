@@ -24,7 +24,9 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 double peak_memory_mb() {
     rusage usage{};
@@ -62,34 +64,42 @@ ReadFrame read_frame(const std::string& path, const MeshSequenceOptions& options
     return frame;
 }
 
-/// One frame along the velocity field, by the midpoint rule. `frame_time` in the unit of time of the velocities.
+/// One frame along the velocity field, by the midpoint rule. `frame_time` in the unit of time of the
+/// velocities.
 Tracker::Motion motion_along(const openvdb::Vec3SGrid::ConstPtr& velocity, double frame_time) {
     const bool staggered = velocity->getGridClass() == openvdb::GRID_STAGGERED;
     const auto at = [velocity, staggered](const Vec3& p) {
         const openvdb::Vec3d index = velocity->worldToIndex(openvdb::Vec3d(p.x(), p.y(), p.z()));
         // The tree itself is sampled: slower than an accessor, but free to use from any thread.
-        const openvdb::Vec3s v = staggered ? openvdb::tools::StaggeredBoxSampler::sample(velocity->constTree(), index)
-                                           : openvdb::tools::BoxSampler::sample(velocity->constTree(), index);
+        const openvdb::Vec3s v =
+            staggered ? openvdb::tools::StaggeredBoxSampler::sample(velocity->constTree(), index)
+                      : openvdb::tools::BoxSampler::sample(velocity->constTree(), index);
         const Vec3 result(v.x(), v.y(), v.z());
         return result.allFinite() ? result : Vec3(Vec3::Zero());
     };
-    return [at, frame_time](const Vec3& p) { return Vec3(p + frame_time * at(p + 0.5 * frame_time * at(p))); };
+    return
+        [at, frame_time](const Vec3& p) { return Vec3(p + frame_time * at(p + 0.5 * frame_time * at(p))); };
 }
 
-void check_outputs(const InputSequence& input, const std::string& output, const MeshSequenceOptions& options) {
+void check_outputs(const InputSequence& input, const std::string& output,
+                   const MeshSequenceOptions& options) {
     if (input.frames.empty()) throw OptionError("no input frames");
     if (!is_mesh_extension(output))
-        throw OptionError("cannot tell a mesh format from '" + output + "'; end it in .ply, .obj, .off, .stl or .vtk");
+        throw OptionError("cannot tell a mesh format from '" + output +
+                          "'; end it in .ply, .obj, .off, .stl or .vtk");
     if (input.frames.size() > 1 && !has_frame_field(output))
         throw OptionError("'" + output + "' names one file for " + std::to_string(input.frames.size()) +
                           " frames; put #### where the frame number goes");
     if (!input.missing.empty() && options.on_missing == OnMissing::Stop)
-        throw OptionError("frame " + std::to_string(input.missing.front()) + " is missing" +
-                          (input.missing.size() > 1 ? " and " + std::to_string(input.missing.size() - 1) + " more" : ""));
+        throw OptionError(
+            "frame " + std::to_string(input.missing.front()) + " is missing" +
+            (input.missing.size() > 1 ? " and " + std::to_string(input.missing.size() - 1) + " more" : ""));
     if (options.on_existing == OnExisting::Refuse)
         for (const InputFrame& frame : input.frames) {
             const std::string path = expand_pattern(output, frame.number);
-            if (fs::exists(path)) throw OptionError("'" + path + "' exists; choose another output, --overwrite or --skip-existing");
+            if (fs::exists(path))
+                throw OptionError("'" + path +
+                                  "' exists; choose another output, --overwrite or --skip-existing");
         }
     if (options.fps && !(*options.fps > 0.0)) throw OptionError("the frame rate must be positive");
     const fs::path folder = fs::path(expand_pattern(output, input.frames.front().number)).parent_path();
@@ -163,9 +173,13 @@ void describe(const TrackedFrame& tracked, const LevelSet& level_set, double tol
         row.status = "empty";
     } else if (!tracked.within_tolerance) {
         char text[128];
-        std::snprintf(text, sizeof text, "largest error %.4g voxels, tolerance %.4g", tracked.max_error / voxel, tolerance / voxel);
+        std::snprintf(text, sizeof text, "largest error %.4g voxels, tolerance %.4g",
+                      tracked.max_error / voxel, tolerance / voxel);
         row.status = "tolerance_not_met";
         row.message = text;
+        if (tracked.lost_crossings > 0)
+            row.message += "; " + std::to_string(tracked.lost_crossings) +
+                           " grid edges cross surface that the mesh lost";
     }
 }
 
@@ -185,7 +199,8 @@ Length parse_length(const std::string& text) {
         used = 0;
     }
     if (used == 0 || used != number.size() || !(length.value > 0.0) || !std::isfinite(length.value))
-        throw OptionError("expected a positive length such as 0.5vx (voxels) or 0.01 (world units), got '" + text + "'");
+        throw OptionError("expected a positive length such as 0.5vx (voxels) or 0.01 (world units), got '" +
+                          text + "'");
     return length;
 }
 
@@ -195,8 +210,8 @@ std::string to_string(const Length& length) {
     return text;
 }
 
-RunReport mesh_sequence(const InputSequence& input, const std::string& output, const MeshSequenceOptions& options,
-                        const MeshSequenceEvents& events) {
+RunReport mesh_sequence(const InputSequence& input, const std::string& output,
+                        const MeshSequenceOptions& options, const MeshSequenceEvents& events) {
     check_outputs(input, output, options);
     tracker_options(options, 1.0);
     RunReport report;
@@ -278,7 +293,8 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output, c
         }
         Tracker::Motion motion;
         const int frames_passed = row.frame - tracked_frame;
-        if (velocity && frames_passed > 0) motion = motion_along(velocity, frames_passed / options.fps.value_or(1.0));
+        if (velocity && frames_passed > 0)
+            motion = motion_along(velocity, frames_passed / options.fps.value_or(1.0));
         TrackedFrame tracked;
         try {
             tracked = tracker->advance(*read.level_set, motion);
@@ -314,8 +330,8 @@ int exit_code(const RunReport& report) {
     std::size_t good = 0, failed = 0;
     for (const FrameReport& row : report.frames) {
         if (row.status == "failed") ++failed;
-        if ((row.status == "ok" && row.closed && row.manifold && row.self_intersections == 0) || row.status == "empty" ||
-            row.status == "skipped")
+        if ((row.status == "ok" && row.closed && row.manifold && row.self_intersections == 0) ||
+            row.status == "empty" || row.status == "skipped")
             ++good;
     }
     if (good == report.frames.size()) return 0;

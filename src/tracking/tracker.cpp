@@ -28,18 +28,23 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3;
-constexpr int kSizingSteps = 3, kCertifySteps = 6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
+constexpr int kSizingSteps = 3,
+              kCertifySteps =
+                  6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
 constexpr int kCertifyRounds = 12, kRelaxedCertifyRounds = 4;
 constexpr int kFitSteps = 4;
 constexpr double kAngleFloor = 2.0;  // resolutions: sharp edges are as round as the grid makes them
-constexpr double kLeastSpacing = 0.05;  // resolutions: for shreds of a single voxel, where nothing coarser closes
+constexpr double kLeastSpacing =
+    0.05;  // resolutions: for shreds of a single voxel, where nothing coarser closes
 
 /// Adds the time from its construction to its destruction to a stage.
 class StageTimer {
 public:
     StageTimer(std::map<std::string, double>& seconds, const char* stage)
         : total_(seconds[stage]), start_(std::chrono::steady_clock::now()) {}
-    ~StageTimer() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    ~StageTimer() {
+        total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    }
 
 private:
     double& total_;
@@ -52,8 +57,8 @@ struct Build {
     CarvedSurface carved;
     Adjacency adjacency;
     std::vector<double> thickness;
-    std::vector<Vec3> vertices;     ///< Of the mesh: fitted when asked for.
-    std::vector<Vec3> on_surface;   ///< The same vertices before the fit.
+    std::vector<Vec3> vertices;    ///< Of the mesh: fitted when asked for.
+    std::vector<Vec3> on_surface;  ///< The same vertices before the fit.
 
     /// The triangles as particle indices, without those that stand on a midpoint.
     std::vector<Triangle> particle_triangles() const {
@@ -79,7 +84,8 @@ std::vector<double> thickness_of(const Particles& particles, const Adjacency& ad
 /// The DT as the paper's descent sees it. The DT numbers its vertices as the particles are numbered.
 class DelaunayNeighbours final : public MovingNeighbours {
 public:
-    explicit DelaunayNeighbours(const std::vector<Vec3>& points) : dt_(make_tetrahedralisation(UpdateStrategy::Rebuild)) {
+    explicit DelaunayNeighbours(const std::vector<Vec3>& points)
+        : dt_(make_tetrahedralisation(UpdateStrategy::Rebuild)) {
         dt_->assign(points);
     }
     void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
@@ -106,12 +112,16 @@ struct Tracker::Impl {
     Id next_id = 0;
 
     explicit Impl(const TrackerOptions& o) : options(o) {
-        if (!(o.tolerance > 0.0)) throw OptionError("the tolerance must be a positive length, got " + std::to_string(o.tolerance));
+        if (!(o.tolerance > 0.0))
+            throw OptionError("the tolerance must be a positive length, got " + std::to_string(o.tolerance));
         if (o.angle_deg && !(*o.angle_deg > 0.0 && *o.angle_deg <= 90.0))
             throw OptionError("the angle must be in (0, 90] degrees, got " + std::to_string(*o.angle_deg));
-        if (o.min_edge && !(*o.min_edge > 0.0)) throw OptionError("the smallest edge must be a positive length");
-        if (o.max_edge && !(*o.max_edge > 0.0)) throw OptionError("the largest edge must be a positive length");
-        if (o.min_edge && o.max_edge && *o.min_edge > *o.max_edge) throw OptionError("the smallest edge is longer than the largest");
+        if (o.min_edge && !(*o.min_edge > 0.0))
+            throw OptionError("the smallest edge must be a positive length");
+        if (o.max_edge && !(*o.max_edge > 0.0))
+            throw OptionError("the largest edge must be a positive length");
+        if (o.min_edge && o.max_edge && *o.min_edge > *o.max_edge)
+            throw OptionError("the smallest edge is longer than the largest");
     }
 
     SizingLimits limits(const Surface& surface) const {
@@ -124,9 +134,10 @@ struct Tracker::Impl {
         return l;
     }
 
-    /// Where each particle is expected on the new surface. A velocity field may be in a unit nobody knows and a motion may have turned round, so
-    /// the guesses compete: the velocity field, the last displacement, standing still. The one that lands nearest to the surface wins, by its
-    /// median over the particles; an earlier one wins unless a later one is clearly better.
+    /// Where each particle is expected on the new surface. A velocity field may be in a unit nobody knows and
+    /// a motion may have turned round, so the guesses compete: the velocity field, the last displacement,
+    /// standing still. The one that lands nearest to the surface wins, by its median over the particles; an
+    /// earlier one wins unless a later one is clearly better.
     std::vector<Vec3> expected_positions(const Surface& surface, const Motion& motion) const {
         constexpr std::size_t kVoters = 2000;
         constexpr double kClearly = 0.8;
@@ -134,7 +145,8 @@ struct Tracker::Impl {
         std::vector<std::vector<Vec3>> guesses;
         if (motion) {
             guesses.emplace_back(n);
-            tbb::parallel_for(std::size_t{0}, n, [&](std::size_t i) { guesses.back()[i] = motion(particles.position[i]); });
+            tbb::parallel_for(std::size_t{0}, n,
+                              [&](std::size_t i) { guesses.back()[i] = motion(particles.position[i]); });
         }
         guesses.emplace_back(n);
         for (std::size_t i = 0; i < n; ++i) guesses.back()[i] = particles.position[i] + particles.velocity[i];
@@ -144,7 +156,8 @@ struct Tracker::Impl {
         double least = std::numeric_limits<double>::infinity();
         for (std::size_t g = 0; g < guesses.size(); ++g) {
             std::vector<double> distances;
-            for (std::size_t i = 0; i < n; i += step) distances.push_back(std::abs(probe->value(guesses[g][i])));
+            for (std::size_t i = 0; i < n; i += step)
+                distances.push_back(std::abs(probe->value(guesses[g][i])));
             if (distances.empty()) break;
             const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
             std::nth_element(distances.begin(), middle, distances.end());
@@ -161,7 +174,8 @@ struct Tracker::Impl {
         const std::size_t n = particles.size();
         std::vector<char> keep(n, 0);
         const std::vector<Vec3> expected = expected_positions(surface, motion);
-        tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
+        tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes(
+            [&] { return surface.probe(); });
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 128), [&](const auto& range) {
             Surface::Probe& probe = *probes.local();
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
@@ -192,15 +206,20 @@ struct Tracker::Impl {
             b.adjacency = vertex_adjacency(b.cells, particles.size());
             b.thickness = thickness_of(particles, b.adjacency);
         }
-        const StageTimer timer(seconds, "convect");
-        const CellLabels labels = options.reconstruction == Reconstruction::Pure
-                                      ? pure_convection(b.cells, particles.position)
-                                      : guided_convection(b.cells, particles.position, particles.normal, surface);
-        b.carved = carve(b.cells, labels, particles.position);
-        std::size_t midpoint = 0;
-        for (const int p : b.carved.particle)
-            b.vertices.push_back(p >= 0 ? particles.position[p] : Vec3(b.carved.midpoints[midpoint++].cast<float>().cast<double>()));
-        b.on_surface = b.vertices;
+        {
+            const StageTimer timer(seconds, "convect");
+            const CellLabels labels =
+                options.reconstruction == Reconstruction::Pure
+                    ? pure_convection(b.cells, particles.position)
+                    : guided_convection(b.cells, particles.position, particles.normal, surface);
+            b.carved = carve(b.cells, labels, particles.position);
+            std::size_t midpoint = 0;
+            for (const int p : b.carved.particle)
+                b.vertices.push_back(p >= 0
+                                         ? particles.position[p]
+                                         : Vec3(b.carved.midpoints[midpoint++].cast<float>().cast<double>()));
+            b.on_surface = b.vertices;
+        }
         if (options.fit) fit_vertices(b, surface, seconds);
         return b;
     }
@@ -217,7 +236,8 @@ struct Tracker::Impl {
         for (Vec3& v : b.vertices) v = v.cast<float>().cast<double>();
     }
 
-    /// Puts fitted vertices back where their triangles cross others, a ring further each time, until none cross. Facets of a DT do not.
+    /// Puts fitted vertices back where their triangles cross others, a ring further each time, until none
+    /// cross. Facets of a DT do not.
     static void undo_crossing_fits(Build& b) {
         TriangleMesh mesh;
         mesh.triangles = b.carved.triangles;
@@ -250,7 +270,8 @@ struct Tracker::Impl {
         const auto errors = triangle_errors(b.vertices, b.carved.triangles, surface, kSizingSteps);
         for (std::size_t t = 0; t < errors.size(); ++t)
             for (const int v : b.carved.triangles[t])
-                if (const int p = b.carved.particle[v]; p >= 0) evidence.error[p] = std::max(evidence.error[p], errors[t].largest);
+                if (const int p = b.carved.particle[v]; p >= 0)
+                    evidence.error[p] = std::max(evidence.error[p], errors[t].largest);
         update_spacing(particles, b.adjacency, evidence, l);
     }
 
@@ -268,7 +289,8 @@ struct Tracker::Impl {
         }
         const auto distances = crossing_distances(b.vertices, b.carved.triangles, crossings, l.tolerance);
         for (std::size_t c = 0; c < crossings.size(); ++c)
-            if (!(distances[c] <= l.tolerance)) shortages.push_back({crossings[c].point, 2.0 * surface.resolution()});
+            if (!(distances[c] <= l.tolerance))
+                shortages.push_back({crossings[c].point, 2.0 * surface.resolution()});
         for (std::size_t e = 0; e + 1 < b.carved.complex_edge_ends.size(); e += 2) {
             const int p = b.carved.complex_edge_ends[e], q = b.carved.complex_edge_ends[e + 1];
             shortages.push_back({0.5 * (particles.position[p] + particles.position[q]),
@@ -276,6 +298,34 @@ struct Tracker::Impl {
         }
         const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
         return densify(particles, shortages, surface, least, next_id);
+    }
+
+    /// The errors of the mesh as it will be written, both ways.
+    static void measure(const Build& b, const Surface& surface, const SizingLimits& l,
+                        const std::vector<Surface::Crossing>& crossings, TrackedFrame& frame) {
+        const StageTimer timer(frame.seconds, "certify");
+        const auto errors = triangle_errors(b.vertices, b.carved.triangles, surface, kCertifySteps);
+        double sum = 0.0, weight = 0.0;
+        for (std::size_t t = 0; t < errors.size(); ++t) {
+            const auto& [i, j, k] = b.carved.triangles[t];
+            const double area = (b.vertices[j] - b.vertices[i]).cross(b.vertices[k] - b.vertices[i]).norm();
+            frame.max_error = std::max(frame.max_error, errors[t].largest);
+            sum += area * errors[t].mean_square;
+            weight += area;
+        }
+        double back = 0.0;
+        std::size_t found = 0;
+        for (const double d :
+             crossing_distances(b.vertices, b.carved.triangles, crossings, 3.0 * l.tolerance)) {
+            if (!std::isfinite(d)) continue;
+            frame.max_error = std::max(frame.max_error, d);
+            back += d * d;
+            ++found;
+        }
+        frame.lost_crossings = crossings.size() - found;
+        frame.rms_error = std::sqrt(
+            std::max(weight > 0.0 ? sum / weight : 0.0, found > 0 ? back / static_cast<double>(found) : 0.0));
+        frame.within_tolerance = frame.max_error <= l.tolerance && frame.lost_crossings == 0;
     }
 
     void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
@@ -286,8 +336,12 @@ struct Tracker::Impl {
 /// Rounds of: mesh, measure, size, relax, births and deaths. More of them the more particles are new.
 void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame) {
     auto& seconds = frame.seconds;
-    const double fresh = particles.empty() ? 0.0 : static_cast<double>(frame.seeded) / static_cast<double>(particles.size());
-    const int rounds = warm ? kWarmRounds + static_cast<int>(std::lround(std::min(1.0, 4.0 * fresh) * (kColdRounds - kWarmRounds))) : kColdRounds;
+    const double fresh =
+        particles.empty() ? 0.0 : static_cast<double>(frame.seeded) / static_cast<double>(particles.size());
+    const int rounds =
+        warm ? kWarmRounds +
+                   static_cast<int>(std::lround(std::min(1.0, 4.0 * fresh) * (kColdRounds - kWarmRounds)))
+             : kColdRounds;
     for (int round = 0; round < rounds; ++round) {
         const Build b = build(surface, seconds);
         {
@@ -305,7 +359,8 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool w
     }
 }
 
-void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame) {
+void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm,
+                                       TrackedFrame& frame) {
     constexpr int kMostColdSweeps = 60, kMostWarmSweeps = 12;
     if (particles.empty()) return;
     const StageTimer timer(frame.seconds, "relax");
@@ -355,21 +410,12 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
             added = refine(b, surface, l, crossings);
         }
         if (added == 0) break;
-        if (round < kRelaxedCertifyRounds) frame.sweeps += relax(particles, build(surface, seconds).adjacency, surface, 2);
+        if (round < kRelaxedCertifyRounds)
+            frame.sweeps += relax(particles, build(surface, seconds).adjacency, surface, 2);
         b = build_to_check();
     }
 
-    const auto errors = triangle_errors(b.vertices, b.carved.triangles, surface, kCertifySteps);
-    double sum = 0.0, weight = 0.0;
-    for (std::size_t t = 0; t < errors.size(); ++t) {
-        const auto& [i, j, k] = b.carved.triangles[t];
-        const double area = (b.vertices[j] - b.vertices[i]).cross(b.vertices[k] - b.vertices[i]).norm();
-        frame.max_error = std::max(frame.max_error, errors[t].largest);
-        sum += area * errors[t].mean_square;
-        weight += area;
-    }
-    frame.rms_error = weight > 0.0 ? std::sqrt(sum / weight) : 0.0;
-    frame.within_tolerance = frame.max_error <= l.tolerance;
+    measure(b, surface, l, crossings, frame);
 
     frame.mesh.points = b.vertices;
     frame.mesh.triangles = b.carved.triangles;
@@ -388,13 +434,19 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
     return frame;
 }
 
-double default_angle_deg(Method method) { return method == Method::Paper ? 20.0 : 60.0; }
+double default_angle_deg(Method method) {
+    return method == Method::Paper ? 20.0 : 60.0;
+}
 
 Tracker::Tracker(const TrackerOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;
-TrackedFrame Tracker::advance(const Surface& surface, const Motion& motion) { return impl_->advance(surface, motion); }
-const Particles& Tracker::particles() const { return impl_->particles; }
+TrackedFrame Tracker::advance(const Surface& surface, const Motion& motion) {
+    return impl_->advance(surface, motion);
+}
+const Particles& Tracker::particles() const {
+    return impl_->particles;
+}
 
 }  // namespace isotrack

@@ -15,7 +15,8 @@ namespace isotrack {
 struct Tetrahedra {
     static constexpr int kInfinite = -1;  ///< The vertex that closes the hull.
 
-    /// Vertex k of facet f of a cell, f being the index of the opposite vertex: counter-clockwise seen from outside the cell.
+    /// Vertex k of facet f of a cell, f being the index of the opposite vertex: counter-clockwise seen from
+    /// outside the cell.
     static constexpr int kFacet[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
 
     std::vector<std::array<int, 4>> vertices;    ///< Per cell; positively oriented; at most one is kInfinite.
@@ -44,15 +45,17 @@ enum class UpdateStrategy {
 };
 const char* name_of(UpdateStrategy strategy);
 
-/// Points that move, come and go, and their DT. Vertices are numbered by the caller's order and keep their number until they are removed.
-/// Between calls the DT may lag behind the points, as the strategy likes; after `settle` it is exact. Not for concurrent use.
+/// Points that move, come and go, and their DT. Vertices are numbered by the caller's order and keep their
+/// number until they are removed. Between calls the DT may lag behind the points, as the strategy likes;
+/// after `settle` it is exact. Not for concurrent use.
 class Tetrahedralisation {
 public:
     virtual ~Tetrahedralisation() = default;
 
     /// Starts anew with vertex i at points[i].
     virtual void assign(const std::vector<Vec3>& points) = 0;
-    /// Adds a vertex and returns its number: the count of vertices ever added. `near` is a vertex close by, or -1.
+    /// Adds a vertex and returns its number: the count of vertices ever added. `near` is a vertex close by,
+    /// or -1.
     virtual int insert(const Vec3& point, int near) = 0;
     virtual void move(int vertex, const Vec3& to) = 0;
     virtual void remove(int vertex) = 0;
@@ -63,7 +66,8 @@ public:
     /// Makes the DT that of the points where they are now.
     virtual void settle() = 0;
 
-    /// The cells as of the last `settle`, none when the points span no volume. A vertex on the very place of another belongs to no cell.
+    /// The cells as of the last `settle`, none when the points span no volume. A vertex on the very place of
+    /// another belongs to no cell.
     virtual const Tetrahedra& cells() const = 0;
 
     /// Vertices relocated one by one since `assign`.

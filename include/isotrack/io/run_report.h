@@ -17,8 +17,9 @@ struct FrameReport {
     double voxel_size = 0.0;
     std::size_t active_voxels = 0, particles = 0, vertices = 0, triangles = 0, components = 0;
     long euler = 0;
-    std::size_t born = 0, died = 0;    ///< Particles of this frame that were not in the last, and the reverse.
-    std::size_t seeded = 0, lost = 0;  ///< Of the born, seeded on uncovered surface; of the died, those the carry lost.
+    std::size_t born = 0, died = 0;  ///< Particles of this frame that were not in the last, and the reverse.
+    std::size_t seeded = 0,
+                lost = 0;  ///< Of the born, seeded on uncovered surface; of the died, those the carry lost.
     int sweeps = 0;
     std::string delaunay_strategy;
     std::size_t relocated = 0;  ///< Vertices the tetrahedralisation moved one by one; 0 when it was rebuilt.
@@ -26,7 +27,8 @@ struct FrameReport {
     double min_angle_deg = 0.0;
     bool closed = true, manifold = true;
     std::size_t self_intersections = 0;
-    std::map<std::string, double> seconds;  ///< read, carry, cover, size, relax, delaunay, convect, certify, fit, write, total.
+    std::map<std::string, double>
+        seconds;  ///< read, carry, cover, size, relax, delaunay, convect, certify, fit, write, total.
     double peak_memory_mb = 0.0;
     std::string status = "ok";  ///< "ok", "empty", "skipped", "failed", "tolerance_not_met".
     std::string message;

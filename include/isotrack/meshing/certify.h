@@ -15,14 +15,17 @@ struct TriangleError {
     Vec3 where = Vec3::Zero();  ///< The sample point with the largest.
 };
 
-/// Errors of each triangle at the points of a regular barycentric lattice with `steps` intervals per edge (>= 1): (steps+1)(steps+2)/2 points.
-/// Uses TBB inside; the result does not depend on the number of threads.
-std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                                           const Surface& surface, int steps);
+/// Errors of each triangle at the points of a regular barycentric lattice with `steps` intervals per edge (>=
+/// 1): (steps+1)(steps+2)/2 points. Uses TBB inside; the result does not depend on the number of threads.
+std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
+                                           const std::vector<Triangle>& triangles, const Surface& surface,
+                                           int steps);
 
-/// Distance of every lattice crossing of the surface to the nearest triangle, in the order of `surface.crossings()`, world units. Exact up to
+/// Distance of every lattice crossing of the surface to the nearest triangle that faces its way (so that one
+/// side of a thin sheet does not stand for the other), in the order of `crossings`, world units. Exact up to
 /// `cutoff`; beyond it the entry is infinite.
-std::vector<double> crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+std::vector<double> crossing_distances(const std::vector<Vec3>& points,
+                                       const std::vector<Triangle>& triangles,
                                        const std::vector<Surface::Crossing>& crossings, double cutoff);
 
 }  // namespace isotrack

@@ -5,7 +5,8 @@
 
 namespace isotrack {
 
-/// Neighbours of every particle: those of i are adjacent[first[i]] to adjacent[first[i + 1] - 1], ascending. Symmetric.
+/// Neighbours of every particle: those of i are adjacent[first[i]] to adjacent[first[i + 1] - 1], ascending.
+/// Symmetric.
 struct Adjacency {
     std::vector<int> first{0};
     std::vector<int> adjacent;
@@ -20,8 +21,8 @@ struct Adjacency {
     std::size_t size() const { return first.size() - 1; }
 };
 
-/// The groups of a colouring in which no two neighbours have the same colour, so that the members of a group can be treated at the same
-/// time. Greedy in the order of the particles: the same at any thread count.
+/// The groups of a colouring in which no two neighbours have the same colour, so that the members of a group
+/// can be treated at the same time. Greedy in the order of the particles: the same at any thread count.
 std::vector<std::vector<int>> colour_groups(const Adjacency& adjacency);
 
 }  // namespace isotrack

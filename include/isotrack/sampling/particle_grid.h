@@ -9,7 +9,8 @@
 
 namespace isotrack {
 
-/// Points in the cells of an unbounded regular grid. Grows by insertion; visits in order of cells, then of insertion.
+/// Points in the cells of an unbounded regular grid. Grows by insertion; visits in order of cells, then of
+/// insertion.
 class PointGrid {
 public:
     /// `cell_size`: world units, > 0; best near the usual query radius.
@@ -41,8 +42,10 @@ private:
     };
     Cell cell(const Vec3& p) const { return (p / cell_size_).array().floor().cast<std::int64_t>(); }
     static std::uint64_t key(const Cell& c) {
-        // Distinct for cells less than 2^21 apart; farther ones share a bucket, where the distance tells them apart.
-        return ((static_cast<std::uint64_t>(c[0]) & 0x1fffff) << 42) | ((static_cast<std::uint64_t>(c[1]) & 0x1fffff) << 21) |
+        // Distinct for cells less than 2^21 apart; farther ones share a bucket, where the distance tells them
+        // apart.
+        return ((static_cast<std::uint64_t>(c[0]) & 0x1fffff) << 42) |
+               ((static_cast<std::uint64_t>(c[1]) & 0x1fffff) << 21) |
                (static_cast<std::uint64_t>(c[2]) & 0x1fffff);
     }
 

@@ -9,11 +9,12 @@ namespace isotrack {
 
 /// Structure of arrays, all of the same length; entry i is one particle. World units.
 struct Particles {
-    std::vector<Vec3> position;    ///< On the surface.
-    std::vector<Vec3> normal;      ///< Unit, outward (O2).
-    std::vector<double> spacing;   ///< Wanted distance h to the nearest neighbour; 1/h is the paper's k in world units.
-    std::vector<Id> id;            ///< Unique over the run, never reused.
-    std::vector<Vec3> velocity;    ///< Displacement since the last frame; zero for the newborn.
+    std::vector<Vec3> position;  ///< On the surface.
+    std::vector<Vec3> normal;    ///< Unit, outward (O2).
+    std::vector<double>
+        spacing;         ///< Wanted distance h to the nearest neighbour; 1/h is the paper's k in world units.
+    std::vector<Id> id;  ///< Unique over the run, never reused.
+    std::vector<Vec3> velocity;  ///< Displacement since the last frame; zero for the newborn.
 
     std::size_t size() const { return position.size(); }
     bool empty() const { return position.empty(); }

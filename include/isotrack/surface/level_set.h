@@ -11,24 +11,26 @@
 namespace isotrack {
 
 struct LevelSetOptions {
-    /// The surface is where the grid has this value, in the grid's own unit. On a grid of class fog volume the inside is
-    /// where the density is higher, on every other grid where the value is lower.
+    /// The surface is where the grid has this value, in the grid's own unit. On a grid of class fog volume
+    /// the inside is where the density is higher, on every other grid where the value is lower.
     double iso = 0.0;
 };
 
 /// The level set of a FloatGrid or DoubleGrid.
 ///
-/// Values are trilinear. Gradients are the trilinear interpolation of central differences at the nodes: continuous, second order.
-/// Any linear transform is understood; gradients and distances are of the world. Values that are distances in voxels (measured at
-/// the surface) are turned into world units. Inside and outside are known everywhere: inactive voxels and tiles carry a sign, a
-/// background of zero means outside, values that are not finite mean outside, and a surface that runs into the border of its voxels is
-/// closed there by a flat cap one voxel beyond the last of them, where volumeToMesh would put it.
-/// Immutable after construction; const members may be called from any number of threads.
+/// Values are trilinear. Gradients are the trilinear interpolation of central differences at the nodes:
+/// continuous, second order. Any linear transform is understood; gradients and distances are of the world.
+/// Values that are distances in voxels (measured at the surface) are turned into world units. Inside and
+/// outside are known everywhere: inactive voxels and tiles carry a sign, a background of zero means outside,
+/// values that are not finite mean outside, and a surface that runs into the border of its voxels is closed
+/// there by a flat cap one voxel beyond the last of them, where volumeToMesh would put it. Immutable after
+/// construction; const members may be called from any number of threads.
 class LevelSet : public Surface {
 public:
-    /// \throws InputError if the grid is neither float nor double, if its transform is not linear, or if it cannot be a level set:
-    /// a grid with active voxels, of a class other than level set, whose values do not take both signs around `iso`.
-    /// A level set without voxels, or without a surface, is allowed: `bounds()` is empty.
+    /// \throws InputError if the grid is neither float nor double, if its transform is not linear, or if it
+    /// cannot be a level set: a grid with active voxels, of a class other than level set, whose values do not
+    /// take both signs around `iso`. A level set without voxels, or without a surface, is allowed: `bounds()`
+    /// is empty.
     explicit LevelSet(openvdb::GridBase::ConstPtr grid, const LevelSetOptions& options = {});
     ~LevelSet() override;
 
@@ -47,7 +49,8 @@ public:
     double value_scale() const;
     /// Edges between neighbouring voxels that cross the surface.
     std::size_t crossing_count() const;
-    /// Those of them that leave the active voxels: where this is not zero the surface meets the border of its grid.
+    /// Those of them that leave the active voxels: where this is not zero the surface meets the border of its
+    /// grid.
     std::size_t border_crossings() const;
     /// The grid that is sampled: values in world units, negative inside, the surface at zero.
     openvdb::FloatGrid::ConstPtr grid() const;

@@ -12,16 +12,19 @@ namespace isotrack {
 
 /// A closed surface given as the zero set of a function that is negative inside.
 ///
-/// Near the surface the value is a distance in world units, to first order. A `Surface` itself is immutable and may be shared by
-/// threads; each thread asks through its own `Probe`, because the grids behind it cache their last access.
+/// Near the surface the value is a distance in world units, to first order. A `Surface` itself is immutable
+/// and may be shared by threads; each thread asks through its own `Probe`, because the grids behind it cache
+/// their last access.
 class Surface {
 public:
     struct Sample {
         double value;   ///< World units, negative inside.
-        Vec3 gradient;  ///< World units per world unit; about 1 long near the surface, 0 where nothing is known.
+        Vec3 gradient;  ///< World units per world unit; about 1 long near the surface, 0 where nothing is
+                        ///< known.
     };
 
-    /// One thread's access to a surface. Cheap to make; must not outlive the surface nor be shared by threads.
+    /// One thread's access to a surface. Cheap to make; must not outlive the surface nor be shared by
+    /// threads.
     class Probe {
     public:
         virtual ~Probe() = default;
@@ -32,9 +35,10 @@ public:
         /// Value and gradient together, for less than the price of both.
         virtual Sample sample(const Vec3& p) = 0;
 
-        /// O1: a point of the surface near `p` by the damped Newton iteration of the paper's algorithm 4, each step at most
-        /// one resolution long. nullopt when there is no way to the surface from here: no gradient (outside the band), or
-        /// no convergence. Override when a formula for the closest point is known.
+        /// O1: a point of the surface near `p` by the damped Newton iteration of the paper's algorithm 4,
+        /// each step at most one resolution long. nullopt when there is no way to the surface from here: no
+        /// gradient (outside the band), or no convergence. Override when a formula for the closest point is
+        /// known.
         virtual std::optional<Vec3> project(const Vec3& p);
 
         /// O2: the unit outward normal, the normalised gradient; zero where there is no gradient.
@@ -66,8 +70,8 @@ public:
         Eigen::Vector3f outward;  ///< Unit direction of the edge, from its end inside to its end outside.
     };
 
-    /// The crossings of a lattice of spacing `resolution()`: every part of the surface wider than a lattice cell holds some. Always in
-    /// the same order. This default scans `bounds()`.
+    /// The crossings of a lattice of spacing `resolution()`: every part of the surface wider than a lattice
+    /// cell holds some. Always in the same order. This default scans `bounds()`.
     virtual std::vector<Crossing> crossings() const;
 };
 

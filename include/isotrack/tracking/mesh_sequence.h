@@ -23,8 +23,11 @@ struct Length {
 Length parse_length(const std::string& text);
 std::string to_string(const Length& length);
 
-enum class OnError { Skip, Stop };            ///< After a frame that cannot be used: go on, or end the run there.
-enum class OnMissing { Skip, Stop };          ///< A gap in the frame numbers: go on with a note, or refuse before the work.
+enum class OnError { Skip, Stop };  ///< After a frame that cannot be used: go on, or end the run there.
+enum class OnMissing {
+    Skip,
+    Stop
+};  ///< A gap in the frame numbers: go on with a note, or refuse before the work.
 enum class OnExisting { Refuse, Overwrite, Skip };
 
 struct MeshSequenceOptions {
@@ -46,17 +49,20 @@ struct MeshSequenceOptions {
 
 /// Called from the thread that runs the sequence.
 struct MeshSequenceEvents {
-    std::function<void(const RunReport&)> started;    ///< Once, when the first usable frame has fixed the effective settings.
-    std::function<void(const FrameReport&)> finished;  ///< After each frame, in order, when its file is in place.
+    std::function<void(const RunReport&)>
+        started;  ///< Once, when the first usable frame has fixed the effective settings.
+    std::function<void(const FrameReport&)>
+        finished;  ///< After each frame, in order, when its file is in place.
 };
 
-/// Tracks `input` and writes one mesh per frame to `output` (a pattern with a number field, or a plain path for a single frame). The next
-/// frame is read and the last one written while a frame is tracked. A frame that cannot be used becomes a row with status "failed" and its
-/// cause; the frames after it are tracked on from the last good one. The report holds a row for every input frame that was reached.
-/// \throws OptionError before any work: bad option, unknown extension, output without a number field, outputs that exist, or gaps where
-/// they are not allowed.
-RunReport mesh_sequence(const InputSequence& input, const std::string& output, const MeshSequenceOptions& options,
-                        const MeshSequenceEvents& events = {});
+/// Tracks `input` and writes one mesh per frame to `output` (a pattern with a number field, or a plain path
+/// for a single frame). The next frame is read and the last one written while a frame is tracked. A frame
+/// that cannot be used becomes a row with status "failed" and its cause; the frames after it are tracked on
+/// from the last good one. The report holds a row for every input frame that was reached. \throws OptionError
+/// before any work: bad option, unknown extension, output without a number field, outputs that exist, or gaps
+/// where they are not allowed.
+RunReport mesh_sequence(const InputSequence& input, const std::string& output,
+                        const MeshSequenceOptions& options, const MeshSequenceEvents& events = {});
 
 /// 0: every row is good; 1: no frame came through; 3: some frames failed or missed their checks.
 int exit_code(const RunReport& report);

@@ -16,7 +16,8 @@ namespace isotrack {
 
 enum class Method {
     Tolerance,  ///< Spacing from the measured error, fed back: fewest triangles for a tolerance.
-    Paper       ///< The paper's angle-driven metric, Gaussian energy, coordinate descent and thresholds; the tolerance is only checked.
+    Paper       ///< The paper's angle-driven metric, Gaussian energy, coordinate descent and thresholds; the
+                ///< tolerance is only checked.
 };
 
 enum class Reconstruction {
@@ -24,32 +25,40 @@ enum class Reconstruction {
     Pure     ///< The geometric convection of the particles alone, as in the paper; for comparison.
 };
 
-/// A bound that rarely matters beside a tolerance (60 degrees); what the whole spacing follows in the paper's method (20 degrees).
+/// A bound that rarely matters beside a tolerance (60 degrees); what the whole spacing follows in the paper's
+/// method (20 degrees).
 double default_angle_deg(Method method);
 
 /// All lengths in world units.
 struct TrackerOptions {
-    double tolerance = 0.0;              ///< > 0. Largest wanted distance between mesh and surface, either way.
-    std::optional<double> angle_deg;     ///< Wanted angle between neighbours' normals, degrees in (0, 90]. Unset: `default_angle_deg`.
-    std::optional<double> min_edge;      ///< Smallest spacing. Unset: half the surface's resolution.
-    std::optional<double> max_edge;      ///< Largest spacing. Unset: 40 times the surface's resolution.
+    double tolerance = 0.0;           ///< > 0. Largest wanted distance between mesh and surface, either way.
+    std::optional<double> angle_deg;  ///< Wanted angle between neighbours' normals, degrees in (0, 90].
+                                      ///< Unset: `default_angle_deg`.
+    std::optional<double> min_edge;   ///< Smallest spacing. Unset: half the surface's resolution.
+    std::optional<double> max_edge;   ///< Largest spacing. Unset: 40 times the surface's resolution.
     Method method = Method::Tolerance;
     Reconstruction reconstruction = Reconstruction::Guided;
-    bool fit = false;                    ///< Vertices leave the surface so that the triangles are nearer to it; particles stay.
-    std::uint64_t seed = 1;              ///< Same seed, same surfaces: same meshes, at any thread count.
+    bool fit = false;  ///< Vertices leave the surface so that the triangles are nearer to it; particles stay.
+    std::uint64_t seed = 1;  ///< Same seed, same surfaces: same meshes, at any thread count.
 };
 
 /// What became of one frame.
 struct TrackedFrame {
-    TriangleMesh mesh;          ///< Closed, oriented, 2-manifold; ids and velocities (displacement since the last frame) per vertex.
+    TriangleMesh mesh;  ///< Closed, oriented, 2-manifold; ids and velocities (displacement since the last
+                        ///< frame) per vertex.
     std::size_t particles = 0;  ///< Vertices beyond these are copies that keep the mesh manifold.
     std::size_t born = 0, died = 0, seeded = 0, lost = 0;
     int sweeps = 0;             ///< Relaxation sweeps over all particles.
     std::size_t relocated = 0;  ///< Vertices the tetrahedralisation moved one by one.
     std::string delaunay_strategy;
-    double max_error = 0.0, rms_error = 0.0;  ///< Distance mesh to surface and back, measured on `mesh`, world units.
-    bool within_tolerance = true;
-    std::map<std::string, double> seconds;    ///< Per stage: carry, cover, size, relax, delaunay, convect, certify.
+    /// The larger of the distances mesh to surface (at 28 points of each triangle) and back (at every lattice
+    /// crossing), measured on `mesh`, world units; RMS likewise. Crossings farther than three tolerances from
+    /// any triangle that faces their way are counted as lost instead.
+    double max_error = 0.0, rms_error = 0.0;
+    std::size_t lost_crossings = 0;  ///< Features below the grid's resolution that the mesh does not hold.
+    bool within_tolerance = true;    ///< max_error is at most the tolerance and nothing is lost.
+    std::map<std::string, double>
+        seconds;  ///< Per stage: carry, cover, size, relax, delaunay, convect, certify.
 };
 
 /// Follows one surface. Not for concurrent use: frames depend on each other. Uses TBB inside.
@@ -64,8 +73,9 @@ public:
     /// Where a point of the last frame is expected in the next: a velocity field's guess.
     using Motion = std::function<Vec3(const Vec3&)>;
 
-    /// Goes on to the next frame, or starts. Without `motion` the particles' own last displacements are extrapolated. An empty surface
-    /// gives an empty mesh and drops all particles; the next surface with something in it starts afresh, ids counting on.
+    /// Goes on to the next frame, or starts. Without `motion` the particles' own last displacements are
+    /// extrapolated. An empty surface gives an empty mesh and drops all particles; the next surface with
+    /// something in it starts afresh, ids counting on.
     TrackedFrame advance(const Surface& surface, const Motion& motion = {});
 
     /// The particles of the last frame.
