@@ -1,1 +1,126 @@
-// (to be written)
+#include "isotrack/meshing/certify.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+namespace isotrack {
+namespace {
+
+/// Squared distance from p to triangle abc [Ericson 2005, "Real-Time Collision Detection", 5.1.5].
+double squared_distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+    const Vec3 ab = b - a, ac = c - a, ap = p - a;
+    const double d1 = ab.dot(ap), d2 = ac.dot(ap);
+    if (d1 <= 0.0 && d2 <= 0.0) return ap.squaredNorm();
+    const Vec3 bp = p - b;
+    const double d3 = ab.dot(bp), d4 = ac.dot(bp);
+    if (d3 >= 0.0 && d4 <= d3) return bp.squaredNorm();
+    const double vc = d1 * d4 - d3 * d2;
+    if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return (ap - d1 / (d1 - d3) * ab).squaredNorm();
+    const Vec3 cp = p - c;
+    const double d5 = ab.dot(cp), d6 = ac.dot(cp);
+    if (d6 >= 0.0 && d5 <= d6) return cp.squaredNorm();
+    const double vb = d5 * d2 - d1 * d6;
+    if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return (ap - d2 / (d2 - d6) * ac).squaredNorm();
+    const double va = d3 * d6 - d5 * d4;
+    if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0)
+        return (bp - (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b)).squaredNorm();
+    const double sum = va + vb + vc;
+    if (!(sum > 0.0)) return std::min({ap.squaredNorm(), bp.squaredNorm(), cp.squaredNorm()});
+    return (ap - (vb / sum) * ab - (vc / sum) * ac).squaredNorm();
+}
+
+}  // namespace
+
+std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                           const Surface& surface, int steps) {
+    std::vector<TriangleError> errors(triangles.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
+        const auto probe = surface.probe();
+        for (std::size_t t = range.begin(); t < range.end(); ++t) {
+            const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]], &c = points[triangles[t][2]];
+            TriangleError& error = errors[t];
+            int count = 0;
+            for (int i = 0; i <= steps; ++i)
+                for (int j = 0; i + j <= steps; ++j) {
+                    const Vec3 p = a + (b - a) * (static_cast<double>(i) / steps) + (c - a) * (static_cast<double>(j) / steps);
+                    const double e = std::abs(probe->value(p));
+                    error.mean_square += e * e;
+                    ++count;
+                    if (e > error.largest) {
+                        error.largest = e;
+                        error.where = p;
+                    }
+                }
+            error.mean_square /= count;
+        }
+    });
+    return errors;
+}
+
+std::vector<double> crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                       const std::vector<Surface::Crossing>& crossings, double cutoff) {
+    std::vector<double> result(crossings.size(), std::numeric_limits<double>::infinity());
+    if (crossings.empty() || triangles.empty()) return result;
+
+    // Triangles are entered into the cells of a grid that their box, widened by the cutoff, touches; a crossing looks into its own cell.
+    Box box;
+    for (const auto& c : crossings) box.extend(c.point);
+    double mean_edge = 0.0;
+    for (const auto& t : triangles) mean_edge += (points[t[0]] - points[t[1]]).norm();
+    const double cell_size = std::max({mean_edge / static_cast<double>(triangles.size()), 2.0 * cutoff, box.diagonal().norm() * 1e-6});
+    Eigen::Array<std::int64_t, 3, 1> size = (box.sizes() / cell_size).array().floor().cast<std::int64_t>() + 1;
+    const auto cell_of = [&](const Vec3& p) {
+        return Eigen::Array<std::int64_t, 3, 1>(((p - box.min()) / cell_size).array().floor().cast<std::int64_t>());
+    };
+    const auto key_of = [&](std::int64_t x, std::int64_t y, std::int64_t z) { return (x * size[1] + y) * size[2] + z; };
+
+    struct Entry {
+        std::int64_t key;
+        int index;
+        bool operator<(const Entry& o) const { return key < o.key || (key == o.key && index < o.index); }
+    };
+    std::vector<Entry> queries(crossings.size());
+    for (std::size_t c = 0; c < crossings.size(); ++c) {
+        const auto cell = cell_of(crossings[c].point).min(size - 1).max(0).eval();
+        queries[c] = {key_of(cell[0], cell[1], cell[2]), static_cast<int>(c)};
+    }
+    std::sort(queries.begin(), queries.end());
+    std::vector<std::int64_t> occupied;
+    for (const Entry& q : queries)
+        if (occupied.empty() || occupied.back() != q.key) occupied.push_back(q.key);
+
+    std::vector<Entry> entries;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        Box reach;
+        for (const int v : triangles[t]) reach.extend(points[v]);
+        const auto low = cell_of(reach.min() - Vec3::Constant(cutoff)).max(0).eval();
+        const auto high = cell_of(reach.max() + Vec3::Constant(cutoff)).min(size - 1).eval();
+        for (std::int64_t x = low[0]; x <= high[0]; ++x)
+            for (std::int64_t y = low[1]; y <= high[1]; ++y) {
+                auto it = std::lower_bound(occupied.begin(), occupied.end(), key_of(x, y, low[2]));
+                for (; it != occupied.end() && *it <= key_of(x, y, high[2]); ++it)
+                    entries.push_back({*it, static_cast<int>(t)});
+            }
+    }
+    std::sort(entries.begin(), entries.end());
+
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, queries.size(), 256), [&](const auto& range) {
+        for (std::size_t q = range.begin(); q < range.end(); ++q) {
+            const Vec3& p = crossings[queries[q].index].point;
+            double least = std::numeric_limits<double>::infinity();
+            auto it = std::lower_bound(entries.begin(), entries.end(), Entry{queries[q].key, -1});
+            for (; it != entries.end() && it->key == queries[q].key; ++it) {
+                const auto& t = triangles[it->index];
+                least = std::min(least, squared_distance(p, points[t[0]], points[t[1]], points[t[2]]));
+            }
+            if (least <= cutoff * cutoff) result[queries[q].index] = std::sqrt(least);
+        }
+    });
+    return result;
+}
+
+}  // namespace isotrack

@@ -1,1 +1,100 @@
-// (to be written)
+#include "isotrack/meshing/convection.h"
+
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+#include <cstddef>
+
+#include "isotrack/delaunay/predicates.h"
+
+namespace isotrack {
+namespace {
+
+constexpr char kOutside = 0, kInside = 1, kFlat = 2;
+constexpr double kFlatness = 1e-10;  // of the cube of the cell's size: below it the circumcentre is noise
+
+/// Circumcentre relative to p0 from the three edge vectors; false when the cell is too flat.
+bool circumcentre(const Vec3& a, const Vec3& b, const Vec3& c, Vec3& centre) {
+    const Vec3 bc = b.cross(c);
+    const double volume6 = a.dot(bc);
+    const double size = std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
+    if (!(std::abs(volume6) > kFlatness * size * std::sqrt(size))) return false;
+    centre = (a.squaredNorm() * bc + b.squaredNorm() * c.cross(a) + c.squaredNorm() * a.cross(b)) / (2.0 * volume6);
+    return true;
+}
+
+/// The facet through which the flow leaves a cell: the circumcentre lies beyond it. -1 when the cell holds its circumcentre.
+int flow_exit(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell) {
+    const auto& v = cells.vertices[cell];
+    for (int k = 0; k < 4; ++k) {
+        const auto& f = Tetrahedra::kFacet[k];
+        if (in_diametral_ball(points[v[f[0]]], points[v[f[1]]], points[v[f[2]]], points[v[k]])) return k;
+    }
+    return -1;
+}
+
+}  // namespace
+
+CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
+                             const Surface& surface) {
+    CellLabels labels(cells.size(), kOutside);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells.size(), 512), [&](const auto& range) {
+        const auto probe = surface.probe();
+        for (std::size_t c = range.begin(); c < range.end(); ++c) {
+            const auto& v = cells.vertices[c];
+            if (cells.is_infinite(static_cast<int>(c))) continue;
+            bool one_sheet = true;
+            for (int a = 0; a < 4; ++a)
+                for (int b = a + 1; b < 4; ++b) one_sheet = one_sheet && normals[v[a]].dot(normals[v[b]]) >= 0.0;
+            const Vec3& p0 = points[v[0]];
+            const Vec3 e1 = points[v[1]] - p0, e2 = points[v[2]] - p0, e3 = points[v[3]] - p0;
+            Vec3 place = 0.25 * (e1 + e2 + e3);
+            if (one_sheet && !circumcentre(e1, e2, e3, place)) {
+                labels[c] = kFlat;
+                continue;
+            }
+            labels[c] = probe->value(p0 + place) < 0.0 ? kInside : kOutside;
+        }
+    });
+    // Flat cells are rare; their flow ends at a cell that is not flat after a few steps, or it is cut off.
+    constexpr int kLongestFlow = 64;
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+        if (labels[c] != kFlat) continue;
+        int at = static_cast<int>(c);
+        for (int step = 0; step < kLongestFlow && labels[at] == kFlat; ++step) {
+            const int exit = flow_exit(cells, points, at);
+            if (exit < 0) break;
+            at = cells.neighbours[at][exit];
+        }
+        labels[c] = labels[at] == kInside ? kInside : kOutside;
+    }
+    return labels;
+}
+
+CellLabels pure_convection(const Tetrahedra& cells, const std::vector<Vec3>& points) {
+    CellLabels labels(cells.size(), kInside);
+    struct HalfFacet {
+        int cell, k;  // seen from the carved cell
+    };
+    std::vector<HalfFacet> front;
+    for (std::size_t c = 0; c < cells.size(); ++c)
+        if (cells.is_infinite(static_cast<int>(c))) labels[c] = kOutside;
+    for (std::size_t c = 0; c < cells.size(); ++c)
+        if (labels[c] == kOutside) front.push_back({static_cast<int>(c), cells.index_of(static_cast<int>(c), Tetrahedra::kInfinite)});
+    while (!front.empty()) {
+        const HalfFacet f = front.back();
+        front.pop_back();
+        const int inner = cells.neighbours[f.cell][f.k];
+        if (labels[inner] == kOutside) continue;
+        const auto& v = cells.vertices[inner];
+        const int apex = cells.mirror_index(f.cell, f.k);
+        const auto& facet = Tetrahedra::kFacet[apex];
+        if (!in_diametral_ball(points[v[facet[0]]], points[v[facet[1]]], points[v[facet[2]]], points[v[apex]])) continue;
+        labels[inner] = kOutside;
+        for (int k = 0; k < 4; ++k)
+            if (k != apex) front.push_back({inner, k});
+    }
+    return labels;
+}
+
+}  // namespace isotrack

@@ -1,1 +1,109 @@
-// (to be written)
+#include "isotrack/sampling/population.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "isotrack/sampling/particle_grid.h"
+
+namespace isotrack {
+
+std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency, const PopulationBand& band) {
+    std::vector<std::pair<double, int>> crowded;
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+        double q = 1e300;
+        for (const int j : adjacency.of(i)) {
+            if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
+            const double h = 0.5 * (particles.spacing[i] + particles.spacing[j]);
+            q = std::min(q, (particles.position[j] - particles.position[i]).norm() / h);
+        }
+        if (q < band.crowded) crowded.emplace_back(q, static_cast<int>(i));
+    }
+    std::sort(crowded.begin(), crowded.end());
+    std::vector<char> keep(particles.size(), 1);
+    for (const auto& [q, i] : crowded) {
+        bool neighbour_went = false;
+        for (const int j : adjacency.of(i)) neighbour_went = neighbour_went || !keep[j];
+        if (!neighbour_went) keep[i] = 0;
+    }
+    return keep;
+}
+
+std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& triangles, const Surface& surface, Id& next_id,
+                        const PopulationBand& band) {
+    std::vector<std::pair<double, int>> large;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        const auto& [a, b, c] = triangles[t];
+        const Vec3 u = particles.position[b] - particles.position[a], v = particles.position[c] - particles.position[a];
+        const double area2 = u.cross(v).norm();
+        if (!(area2 > 0.0)) continue;
+        const double radius = u.norm() * v.norm() * (u - v).norm() / (2.0 * area2);
+        const double h = (particles.spacing[a] + particles.spacing[b] + particles.spacing[c]) / 3.0;
+        if (radius > band.sparse * h) large.emplace_back(-radius / h, static_cast<int>(t));
+    }
+    std::sort(large.begin(), large.end());
+    std::vector<char> touched(particles.size(), 0);
+    const auto probe = surface.probe();
+    std::size_t added = 0;
+    for (const auto& [ratio, t] : large) {
+        const auto& [a, b, c] = triangles[t];
+        if (touched[a] || touched[b] || touched[c]) continue;
+        const Vec3 pa = particles.position[a], u = particles.position[b] - pa, v = particles.position[c] - pa, w = u.cross(v);
+        const double h = (particles.spacing[a] + particles.spacing[b] + particles.spacing[c]) / 3.0;
+        // An obtuse triangle has its circumcentre far outside: stay within one spacing.
+        Vec3 centre = (u.squaredNorm() * v.cross(w) + v.squaredNorm() * w.cross(u)) / (2.0 * w.squaredNorm());
+        const Vec3 middle = (u + v) / 3.0;
+        if ((centre - middle).norm() > h) centre = middle + h * (centre - middle).normalized();
+        const auto p = probe->project(pa + centre);
+        if (!p) continue;
+        const Vec3 n = probe->normal(*p);
+        if (!(n.dot(particles.normal[a] + particles.normal[b] + particles.normal[c]) > 0.0)) continue;
+        const Vec3 velocity = (particles.velocity[a] + particles.velocity[b] + particles.velocity[c]) / 3.0;
+        particles.add(*p, n, h, next_id++, velocity);
+        touched[a] = touched[b] = touched[c] = 1;
+        ++added;
+    }
+    return added;
+}
+
+std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface, double min_spacing,
+                    Id& next_id) {
+    constexpr double kApart = 0.5, kShrink = 0.6;
+    if (shortages.empty()) return 0;
+    PointGrid grid(2.0 * surface.resolution());
+    for (std::size_t i = 0; i < particles.size(); ++i) grid.insert(particles.position[i], static_cast<int>(i));
+    std::vector<char> shrunk(particles.size(), 0);
+    const auto probe = surface.probe();
+    std::size_t changes = 0;
+    for (const Shortage& s : shortages) {
+        const auto p = probe->project(s.place);
+        if (!p) continue;
+        const Vec3 n = probe->normal(*p);
+        double h = std::max(s.spacing, min_spacing);
+        int nearest = -1;
+        double least = 1e300;
+        grid.for_each_within(*p, kApart * h, [&](int i, double d2) {
+            if (d2 >= least || !(particles.normal[i].dot(n) > 0.0)) return;
+            least = d2;
+            nearest = i;
+        });
+        if (nearest >= 0) {
+            h = std::max(min_spacing, kShrink * std::min(h, particles.spacing[nearest]));
+            if (std::sqrt(least) < kApart * h) {
+                if (shrunk[nearest] || particles.spacing[nearest] <= min_spacing) continue;
+                particles.spacing[nearest] = h;
+                shrunk[nearest] = 1;
+                ++changes;
+                continue;
+            }
+        }
+        grid.insert(*p, static_cast<int>(particles.size()));
+        particles.add(*p, n, h, next_id++);
+        shrunk.push_back(1);
+        ++changes;
+    }
+    return changes;
+}
+
+}  // namespace isotrack

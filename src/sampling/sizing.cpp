@@ -1,1 +1,98 @@
-// (to be written)
+#include "isotrack/sampling/sizing.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace isotrack {
+namespace {
+
+constexpr double kShare = 0.72;        // of the tolerance, aimed at by the largest error around a particle
+constexpr double kGradation = 0.25;    // growth of the spacing per distance
+constexpr int kGradationPasses = 3;
+constexpr double kThicknessShare = 0.9;
+
+template <typename Body>
+void for_each_particle(std::size_t n, const Body& body) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 256), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
+    });
+}
+
+void limit_gradation(Particles& particles, const Adjacency& adjacency) {
+    std::vector<double> next(particles.size());
+    for (int pass = 0; pass < kGradationPasses; ++pass) {
+        for_each_particle(particles.size(), [&](std::size_t i) {
+            double h = particles.spacing[i];
+            for (const int j : adjacency.of(i)) {
+                if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
+                h = std::min(h, particles.spacing[j] + kGradation * (particles.position[j] - particles.position[i]).norm());
+            }
+            next[i] = h;
+        });
+        particles.spacing.swap(next);
+    }
+}
+
+double bounded(double h, const SizingLimits& limits) { return std::clamp(h, limits.min_edge, limits.max_edge); }
+
+}  // namespace
+
+double spacing_from_curvature(Surface::Probe& probe, const Vec3& p, const Vec3& n, double resolution, const SizingLimits& limits) {
+    // Curvature of the normal sections along two tangents, from normals two resolutions apart; the larger one counts.
+    const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
+    double kappa = 0.0;
+    for (const Vec3& t : {a, b, Vec3((a + b).normalized()), Vec3((a - b).normalized())}) {
+        const Vec3 forward = probe.normal(p + resolution * t), back = probe.normal(p - resolution * t);
+        kappa = std::max(kappa, (forward - back).norm() / (2.0 * resolution));
+    }
+    // Error of an equilateral triangle on a sphere: kappa h^2 / 6.
+    const double by_error = std::sqrt(6.0 * kShare * limits.tolerance / std::max(kappa, 1e-12));
+    const double by_angle = std::max(limits.angle / std::max(kappa, 1e-12), limits.angle_floor);
+    return bounded(std::min(by_error, by_angle), limits);
+}
+
+double normal_deviation(const Particles& particles, const Adjacency& adjacency, std::size_t i) {
+    double k2 = 0.0;
+    for (const int j : adjacency.of(i)) {
+        const double cosine = particles.normal[i].dot(particles.normal[j]);
+        if (!(cosine > 0.0)) continue;
+        const double r2 = (particles.position[j] - particles.position[i]).squaredNorm();
+        if (r2 > 0.0) k2 = std::max(k2, (1.0 - cosine) / r2);
+    }
+    return std::sqrt(k2);
+}
+
+void update_spacing(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence, const SizingLimits& limits) {
+    const std::size_t n = particles.size();
+    std::vector<double> log_k2(n);
+    for_each_particle(n, [&](std::size_t i) {
+        const double h = particles.spacing[i], e = evidence.error[i];
+        const double factor = e < 0.0 ? 1.0 : std::clamp(e / (kShare * limits.tolerance), 0.5, 2.0);
+        log_k2[i] = std::log(factor / (h * h));
+    });
+    std::vector<double> next(n);
+    for_each_particle(n, [&](std::size_t i) {
+        double sum = log_k2[i];
+        int count = 1;
+        for (const int j : adjacency.of(i)) {
+            if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
+            sum += log_k2[j];
+            ++count;
+        }
+        // The mean keeps noise out; where the tolerance is missed the particle's own need counts.
+        const double mean = sum / count;
+        const bool missed = evidence.error[i] > 0.95 * limits.tolerance;
+        double h = std::exp(-0.5 * (missed ? std::max(mean, log_k2[i]) : mean));
+        // 1 - cos t ~ t^2 / 2, so the curvature is sqrt(2) k_nd.
+        const double kappa = std::sqrt(2.0) * normal_deviation(particles, adjacency, i);
+        if (kappa > 0.0) h = std::min(h, std::max({limits.angle / kappa, limits.angle_floor, 0.7 * particles.spacing[i]}));
+        h = std::min(h, std::max(kThicknessShare * evidence.thickness[i], 0.7 * particles.spacing[i]));
+        next[i] = bounded(h, limits);
+    });
+    particles.spacing.swap(next);
+    limit_gradation(particles, adjacency);
+}
+
+}  // namespace isotrack

@@ -1,1 +1,444 @@
-// (to be written)
+#include "isotrack/surface/level_set.h"
+
+#include <openvdb/tools/SignedFloodFill.h>
+#include <openvdb/tree/LeafManager.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+
+#include "isotrack/error.h"
+
+namespace isotrack {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using Leaf = FloatTree::LeafNodeType;
+using Accessor = openvdb::tree::ValueAccessor<const FloatTree, false>;  // unregistered: the tree outlives it
+
+constexpr double kProjectionError = 1e-4;  // voxels; float values carry no more
+constexpr double kFarVoxels = 10.0;        // values are clamped to this many voxels
+constexpr int kCapLayers = 4;              // voxels added beyond a block whose border cuts the surface
+constexpr int kLeafDim = Leaf::DIM;
+
+Vec3 to_eigen(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
+
+std::string grid_label(const openvdb::GridBase& grid) {
+    return grid.getName().empty() ? "unnamed grid" : "grid '" + grid.getName() + "'";
+}
+
+struct AffineMap {
+    Mat3 linear, inverse;
+    Vec3 shift;
+    double voxel_size;
+
+    explicit AffineMap(const openvdb::GridBase& grid) {
+        if (!grid.transform().isLinear())
+            throw InputError(grid_label(grid) + " has a frustum transform; resample it to a linear one");
+        shift = to_eigen(grid.indexToWorld(openvdb::Vec3d(0.0)));
+        for (int axis = 0; axis < 3; ++axis) {
+            openvdb::Vec3d unit(0.0);
+            unit[axis] = 1.0;
+            linear.col(axis) = to_eigen(grid.indexToWorld(unit)) - shift;
+        }
+        const double volume = std::abs(linear.determinant());
+        if (!(volume > 0.0) || !std::isfinite(volume))
+            throw InputError(grid_label(grid) + " has a transform that cannot be inverted");
+        inverse = linear.inverse();
+        voxel_size = std::cbrt(volume);
+    }
+    Vec3 to_world(const Vec3& index) const { return linear * index + shift; }
+    Vec3 to_index(const Vec3& world) const { return inverse * (world - shift); }
+    Vec3 gradient_to_world(const Vec3& index_gradient) const { return inverse.transpose() * index_gradient; }
+};
+
+/// Values around one lattice cell. The cell's corners are (0..1)^3; the values one further out in each axis are those that the
+/// central differences at the corners need.
+class Stencil {
+public:
+    explicit Stencil(const FloatTree& tree) : accessor_(tree) {}
+
+    double value(const Vec3& index) {
+        Vec3 t;
+        const Coord base = split(index, t);
+        float v[2][2][2];
+        const int x = base.x() & (kLeafDim - 1), y = base.y() & (kLeafDim - 1), z = base.z() & (kLeafDim - 1);
+        const Leaf* leaf = nullptr;
+        if (x < kLeafDim - 1 && y < kLeafDim - 1 && z < kLeafDim - 1) leaf = accessor_.probeConstLeaf(base);
+        for (int i = 0; i < 2; ++i)
+            for (int j = 0; j < 2; ++j)
+                for (int k = 0; k < 2; ++k)
+                    v[i][j][k] = leaf ? leaf->getValue(offset(x + i, y + j, z + k)) : accessor_.getValue(base.offsetBy(i, j, k));
+        const auto mix = [](double a, double b, double s) { return a + s * (b - a); };
+        double planes[2];
+        for (int i = 0; i < 2; ++i)
+            planes[i] = mix(mix(v[i][0][0], v[i][0][1], t.z()), mix(v[i][1][0], v[i][1][1], t.z()), t.y());
+        return mix(planes[0], planes[1], t.x());
+    }
+
+    /// Trilinear value, and the trilinear interpolation of the central differences at the corners, per voxel.
+    Surface::Sample sample(const Vec3& index) {
+        Vec3 t;
+        const Coord base = split(index, t);
+        float v[4][4][4];  // v[i + 1][j + 1][k + 1] at base + (i, j, k); corners of the 4-cube are not read
+        gather(base, v);
+        const double w[3][2] = {{1.0 - t.x(), t.x()}, {1.0 - t.y(), t.y()}, {1.0 - t.z(), t.z()}};
+        Surface::Sample result{0.0, Vec3::Zero()};
+        for (int a = 0; a < 2; ++a)
+            for (int b = 0; b < 2; ++b) {
+                const double xy = w[0][a] * w[1][b], yz = w[1][a] * w[2][b], xz = w[0][a] * w[2][b];
+                const float* line = v[a + 1][b + 1];
+                result.value += xy * (w[2][0] * line[1] + w[2][1] * line[2]);
+                result.gradient.z() += xy * (w[2][0] * (line[2] - line[0]) + w[2][1] * (line[3] - line[1]));
+                result.gradient.x() += yz * (w[0][0] * (v[2][a + 1][b + 1] - v[0][a + 1][b + 1]) +
+                                             w[0][1] * (v[3][a + 1][b + 1] - v[1][a + 1][b + 1]));
+                result.gradient.y() += xz * (w[1][0] * (v[a + 1][2][b + 1] - v[a + 1][0][b + 1]) +
+                                             w[1][1] * (v[a + 1][3][b + 1] - v[a + 1][1][b + 1]));
+            }
+        result.gradient *= 0.5;
+        return result;
+    }
+
+private:
+    static openvdb::Index offset(int x, int y, int z) { return (x << (2 * Leaf::LOG2DIM)) + (y << Leaf::LOG2DIM) + z; }
+
+    static Coord split(const Vec3& index, Vec3& t) {
+        // Points far outside any grid, or not finite, read the background at a corner of the representable range.
+        constexpr double kLimit = 1 << 30;
+        Coord base;
+        for (int axis = 0; axis < 3; ++axis) {
+            const double x = std::isfinite(index[axis]) ? std::clamp(index[axis], -kLimit, kLimit) : kLimit;
+            const double floor = std::floor(x);
+            base[axis] = static_cast<int>(floor);
+            t[axis] = x - floor;
+        }
+        return base;
+    }
+
+    void gather(const Coord& base, float (&v)[4][4][4]) {
+        const int x = base.x() & (kLeafDim - 1), y = base.y() & (kLeafDim - 1), z = base.z() & (kLeafDim - 1);
+        const auto inner = [](int c) { return c >= 1 && c <= kLeafDim - 3; };
+        const Leaf* leaf = inner(x) && inner(y) && inner(z) ? accessor_.probeConstLeaf(base) : nullptr;
+        for (int i = 0; i < 4; ++i)
+            for (int j = 0; j < 4; ++j) {
+                const int outer = (i == 0 || i == 3) + (j == 0 || j == 3);
+                if (outer == 2) continue;
+                const int first = outer == 0 ? 0 : 1, last = outer == 0 ? 4 : 3;
+                if (leaf) {
+                    const float* line = leaf->buffer().data() + offset(x + i - 1, y + j - 1, z - 1);
+                    for (int k = first; k < last; ++k) v[i][j][k] = line[k];
+                } else {
+                    for (int k = first; k < last; ++k)
+                        v[i][j][k] = accessor_.getValue(base.offsetBy(i - 1, j - 1, k - 1));
+                }
+            }
+    }
+
+    Accessor accessor_;
+};
+
+/// A lattice edge that crosses the surface: from `from`, `fraction` of a voxel along `axis`.
+struct CrossedEdge {
+    Coord from;
+    int axis;
+    float fraction;
+    bool outward;    ///< `from` is the end inside.
+    bool at_border;  ///< One end is an inactive voxel.
+
+    Vec3 index() const {
+        Vec3 p(from.x(), from.y(), from.z());
+        p[axis] += fraction;
+        return p;
+    }
+};
+
+/// Every edge with a sign change, leaf by leaf. Edges between two tiles are not seen: a level set has voxels at its surface.
+std::vector<CrossedEdge> find_crossings(const FloatTree& tree) {
+    const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
+    std::vector<std::vector<CrossedEdge>> per_leaf(leaves.leafCount());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.leafCount(), 16), [&](const auto& range) {
+        Accessor accessor(tree);
+        for (std::size_t n = range.begin(); n < range.end(); ++n) {
+            const Leaf& leaf = leaves.leaf(n);
+            const float* data = leaf.buffer().data();
+            const Coord origin = leaf.origin();
+            std::vector<CrossedEdge>& found = per_leaf[n];
+            const auto add = [&](const Coord& from, int axis, float a, float b) {
+                if ((a < 0.0f) == (b < 0.0f)) return;
+                const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
+                const bool border = !accessor.isValueOn(from) || !accessor.isValueOn(from.offsetBy(axis == 0, axis == 1, axis == 2));
+                found.push_back({from, axis, fraction, a < 0.0f, border});
+            };
+            constexpr int kStride[3] = {kLeafDim * kLeafDim, kLeafDim, 1};
+            for (int i = 0; i < static_cast<int>(Leaf::SIZE); ++i) {
+                const Coord local(i / kStride[0], (i / kStride[1]) % kLeafDim, i % kLeafDim);
+                for (int axis = 0; axis < 3; ++axis)
+                    if (local[axis] < kLeafDim - 1 && (data[i] < 0.0f) != (data[i + kStride[axis]] < 0.0f))
+                        add(origin + local, axis, data[i], data[i + kStride[axis]]);
+            }
+            // Across the leaf's faces: upwards always, downwards only where no leaf sees the edge from below.
+            for (int axis = 0; axis < 3; ++axis) {
+                Coord below = origin;
+                below[axis] -= 1;
+                const bool open_below = accessor.probeConstLeaf(below) == nullptr;
+                const int u = (axis + 1) % 3, w = (axis + 2) % 3;
+                for (int a = 0; a < kLeafDim; ++a)
+                    for (int b = 0; b < kLeafDim; ++b) {
+                        Coord top = origin;
+                        top[u] += a;
+                        top[w] += b;
+                        Coord bottom = top;
+                        top[axis] += kLeafDim - 1;
+                        Coord beyond = top;
+                        beyond[axis] += 1;
+                        add(top, axis, leaf.getValue(top), accessor.getValue(beyond));
+                        if (!open_below) continue;
+                        Coord before = bottom;
+                        before[axis] -= 1;
+                        add(before, axis, accessor.getValue(before), leaf.getValue(bottom));
+                    }
+            }
+        }
+    });
+    std::vector<CrossedEdge> all;
+    std::size_t count = 0;
+    for (const auto& part : per_leaf) count += part.size();
+    all.reserve(count);
+    for (const auto& part : per_leaf) all.insert(all.end(), part.begin(), part.end());
+    return all;
+}
+
+/// Median length of the world gradient at the surface, away from the border; 0 when there is nothing to measure.
+double slope_at_surface(const FloatTree& tree, const AffineMap& map, const std::vector<CrossedEdge>& crossings) {
+    constexpr std::size_t kSamples = 4000;
+    Stencil stencil(tree);
+    std::vector<double> slopes;
+    const std::size_t step = 1 + crossings.size() / kSamples;
+    for (int pass = 0; pass < 2 && slopes.empty(); ++pass)  // the border only when there is nothing else
+        for (std::size_t i = 0; i < crossings.size(); i += step) {
+            if (pass == 0 && crossings[i].at_border) continue;
+            const double slope = map.gradient_to_world(stencil.sample(crossings[i].index()).gradient).norm();
+            if (std::isfinite(slope) && slope > 0.0) slopes.push_back(slope);
+        }
+    if (slopes.empty()) return 0.0;
+    const auto middle = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2);
+    std::nth_element(slopes.begin(), middle, slopes.end());
+    return *middle;
+}
+
+/// World units per grid unit for a measured slope: exact where the unit is recognised.
+double value_scale_for(double slope, double voxel_size) {
+    constexpr double kRecognised = 0.25;
+    if (!(slope > 0.0) || std::abs(slope - 1.0) < kRecognised) return 1.0;
+    if (std::abs(slope * voxel_size - 1.0) < kRecognised) return voxel_size;
+    return 1.0 / slope;
+}
+
+/// A float copy with `sign * (value - iso)`, active tiles turned into voxels, and no value that is not finite.
+template <typename GridType>
+FloatGrid::Ptr float_copy(const GridType& source, double iso, double sign) {
+    using Value = typename GridType::ValueType;
+    const auto convert = [=](Value v) {
+        const double shifted = sign * (static_cast<double>(v) - iso);
+        if (std::isnan(shifted)) return std::numeric_limits<float>::max();
+        return static_cast<float>(std::clamp<double>(shifted, std::numeric_limits<float>::lowest(), std::numeric_limits<float>::max()));
+    };
+    const auto voxels = source.deepCopy();
+    voxels->tree().voxelizeActiveTiles();
+    auto copy = FloatGrid::create(convert(source.background()));
+    copy->setTransform(source.transform().copy());
+    copy->setTree(std::make_shared<FloatTree>(voxels->tree(), convert(source.background()), openvdb::TopologyCopy()));
+    const auto source_accessor = source.getConstAccessor();
+    openvdb::tree::LeafManager<FloatTree> leaves(copy->tree());
+    leaves.foreach([&](Leaf& leaf, std::size_t) {
+        auto reader = source.getConstUnsafeAccessor();
+        float* data = leaf.buffer().data();
+        for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) data[i] = convert(reader.getValue(leaf.offsetToGlobalCoord(i)));
+    });
+    // Inactive tiles keep the sign they had.
+    for (auto tile = copy->tree().beginValueOff(); tile; ++tile)
+        if (!tile.isVoxelValue()) tile.setValue(convert(source_accessor.getValue(tile.getCoord())));
+    return copy;
+}
+
+/// A dense block whose background says nothing: adds voxels around it so that the surface goes straight on past the block's last voxels
+/// and is cut by a flat cap one voxel beyond them.
+void cap_block(FloatGrid& grid, const openvdb::CoordBBox& block, double voxel) {
+    const auto outer = openvdb::CoordBBox(block.min().offsetBy(-kCapLayers), block.max().offsetBy(kCapLayers));
+    const FloatGrid::ConstPtr inside = grid.deepCopy();
+    auto accessor = grid.getAccessor();
+    const auto reader = inside->getConstAccessor();
+    for (auto c = outer.begin(); c; ++c) {
+        Coord nearest = *c;
+        nearest.minComponent(block.max());
+        nearest.maxComponent(block.min());
+        // Distance to the cap in voxels: negative in front of it.
+        int depth = std::numeric_limits<int>::min();
+        for (int axis = 0; axis < 3; ++axis) {
+            const int past_top = (*c)[axis] - block.max()[axis] - 1, past_bottom = block.min()[axis] - 1 - (*c)[axis];
+            depth = std::max({depth, past_top, past_bottom});
+        }
+        const float cap = static_cast<float>(depth * voxel);
+        if (depth < -kCapLayers) continue;
+        accessor.setValue(*c, std::max(reader.getValue(nearest), cap));
+    }
+}
+
+}  // namespace
+
+struct LevelSet::Impl {
+    AffineMap map;
+    FloatGrid::ConstPtr grid;
+    double scale = 1.0;
+    double reach = 0.0;
+    std::size_t active_voxels = 0, border_crossings = 0;
+    std::vector<Surface::Crossing> crossings;
+    Box bounds;
+
+    Impl(const openvdb::GridBase::ConstPtr& source, const LevelSetOptions& options) : map(*source) {
+        const auto floats = openvdb::gridConstPtrCast<FloatGrid>(source);
+        const auto doubles = openvdb::gridConstPtrCast<openvdb::DoubleGrid>(source);
+        if (!floats && !doubles)
+            throw InputError(grid_label(*source) + " holds " + source->valueType() + " values, not float or double distances");
+        active_voxels = source->activeVoxelCount();
+        const auto grid_class = source->getGridClass();
+        const bool fog = grid_class == openvdb::GRID_FOG_VOLUME;
+        if (fog && options.iso == 0.0)
+            throw InputError(grid_label(*source) + " is a fog volume, not a level set; give the density of the surface as iso value");
+        if (active_voxels == 0 && grid_class != openvdb::GRID_LEVEL_SET)
+            throw InputError(grid_label(*source) + " has no voxels and is of class '" +
+                             openvdb::GridBase::gridClassToString(grid_class) + "', not a level set");
+
+        const double sign = fog ? -1.0 : 1.0;
+        const bool plain = floats && options.iso == 0.0 && !fog && is_plain(*floats);
+        FloatGrid::Ptr own;
+        if (!plain) {
+            own = floats ? float_copy(*floats, options.iso, sign) : float_copy(*doubles, options.iso, sign);
+            grid = own;
+        } else {
+            grid = floats;
+        }
+
+        std::vector<CrossedEdge> found = find_crossings(grid->constTree());
+        if (found.empty() && active_voxels > 0 && grid_class != openvdb::GRID_LEVEL_SET)
+            throw InputError(grid_label(*source) + " is not a level set: its values do not change sign around " +
+                             std::to_string(options.iso) + " (class '" +
+                             openvdb::GridBase::gridClassToString(grid_class) + "'); give an iso value inside its range");
+        scale = value_scale_for(slope_at_surface(grid->constTree(), map, found), map.voxel_size);
+        border_crossings = static_cast<std::size_t>(std::count_if(found.begin(), found.end(), [](const auto& c) { return c.at_border; }));
+
+        if (!own && scale != 1.0) grid = own = floats->deepCopy();
+        if (own) {
+            normalise(*own, source->getGridClass());
+            found = find_crossings(own->constTree());
+        }
+        const double background = grid->background();
+        reach = std::clamp(background, map.voxel_size, kFarVoxels * map.voxel_size);
+        crossings.reserve(found.size());
+        for (const CrossedEdge& c : found) {
+            const Vec3 outward = map.linear.col(c.axis).normalized() * (c.outward ? 1.0 : -1.0);
+            crossings.push_back({map.to_world(c.index()), outward.cast<float>()});
+            bounds.extend(crossings.back().point);
+        }
+    }
+
+    /// A float grid that can be sampled as it is, once its values are known to be world distances.
+    static bool is_plain(const FloatGrid& grid) {
+        const float background = grid.background();
+        if (!(background > 0.0f) || !std::isfinite(background) || grid.tree().activeTileCount() > 0) return false;
+        openvdb::tree::LeafManager<const FloatTree> leaves(grid.constTree());
+        std::atomic<bool> finite{true};
+        leaves.foreach([&](const Leaf& leaf, std::size_t) {
+            const float* data = leaf.buffer().data();
+            float sum = 0.0f;  // stays finite unless a value is not; leaves hold too few values to overflow otherwise
+            for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) sum += data[i] * 0.0f;
+            if (!(sum == 0.0f)) finite = false;
+        });
+        return finite;
+    }
+
+    /// World units, clamped, signs everywhere.
+    void normalise(FloatGrid& own, openvdb::GridClass) {
+        const float far = static_cast<float>(kFarVoxels * map.voxel_size);
+        const float factor = static_cast<float>(scale);
+        const float old_background = own.background();
+        // Zero stays zero and means outside: a block's background of 0 is mended below.
+        const auto convert = [=](float v) { return std::clamp(v * factor, -far, far); };
+        openvdb::tree::LeafManager<FloatTree> leaves(own.tree());
+        leaves.foreach([&](Leaf& leaf, std::size_t) {
+            float* data = leaf.buffer().data();
+            for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) data[i] = convert(data[i]);
+        });
+        for (auto tile = own.tree().beginValueOff(); tile; ++tile)
+            if (!tile.isVoxelValue()) tile.setValue(convert(tile.getValue()));
+
+        const bool silent = !(old_background > 0.0f);
+        const float background = silent ? static_cast<float>(3.0 * map.voxel_size) : convert(old_background);
+        if (silent) {
+            const auto block = own.evalActiveVoxelBoundingBox();
+            const bool dense = own.activeVoxelCount() == block.volume();
+            set_outside(own, background);
+            if (dense && !block.empty())
+                cap_block(own, block, map.voxel_size);
+            else
+                openvdb::tools::signedFloodFill(own.tree());
+        } else if (background != old_background) {
+            own.tree().root().setBackground(background, /*updateChildNodes=*/false);
+        }
+        own.setGridClass(openvdb::GRID_LEVEL_SET);
+    }
+
+    /// Gives every inactive voxel and tile the value `outside`.
+    static void set_outside(FloatGrid& own, float outside) {
+        for (auto value = own.tree().beginValueOff(); value; ++value) value.setValue(outside);
+        own.tree().root().setBackground(outside, /*updateChildNodes=*/false);
+    }
+};
+
+namespace {
+
+class GridProbe final : public Surface::Probe {
+public:
+    GridProbe(const FloatTree& tree, const AffineMap& map)
+        : Probe(kProjectionError * map.voxel_size, map.voxel_size), map_(map), stencil_(tree) {}
+
+    double value(const Vec3& p) override { return stencil_.value(map_.to_index(p)); }
+
+    Surface::Sample sample(const Vec3& p) override {
+        Surface::Sample s = stencil_.sample(map_.to_index(p));
+        s.gradient = map_.gradient_to_world(s.gradient);
+        return s;
+    }
+
+private:
+    const AffineMap& map_;
+    Stencil stencil_;
+};
+
+}  // namespace
+
+LevelSet::LevelSet(openvdb::GridBase::ConstPtr grid, const LevelSetOptions& options) {
+    if (!grid) throw InputError("a level set needs a grid, got none");
+    impl_ = std::make_unique<const Impl>(grid, options);
+}
+LevelSet::~LevelSet() = default;
+
+std::unique_ptr<Surface::Probe> LevelSet::probe() const {
+    return std::make_unique<GridProbe>(impl_->grid->constTree(), impl_->map);
+}
+double LevelSet::resolution() const { return impl_->map.voxel_size; }
+double LevelSet::reach() const { return impl_->reach; }
+Box LevelSet::bounds() const { return impl_->bounds; }
+std::vector<Surface::Crossing> LevelSet::crossings() const { return impl_->crossings; }
+bool LevelSet::empty() const { return impl_->crossings.empty(); }
+std::size_t LevelSet::active_voxels() const { return impl_->active_voxels; }
+double LevelSet::value_scale() const { return impl_->scale; }
+std::size_t LevelSet::crossing_count() const { return impl_->crossings.size(); }
+std::size_t LevelSet::border_crossings() const { return impl_->border_crossings; }
+openvdb::FloatGrid::ConstPtr LevelSet::grid() const { return impl_->grid; }
+
+}  // namespace isotrack

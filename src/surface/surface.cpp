@@ -1,1 +1,85 @@
-// (to be written)
+#include "isotrack/surface/surface.h"
+
+#include <cmath>
+
+namespace isotrack {
+namespace {
+
+constexpr int kMaxTrials = 40;           // a good start needs 3 to 5
+constexpr double kFirstDamping = 1e-3;   // the paper starts at 1, which only halves the first step
+constexpr double kLargestDamping = 1e4;  // steps are then too short to matter
+constexpr double kLeastGradient = 1e-3;  // of a distance's 1: below it nothing is known
+
+}  // namespace
+
+std::optional<Vec3> Surface::Probe::project(const Vec3& start) {
+    // f, p and lambda as in the paper's algorithm 4.
+    Vec3 p = start;
+    Sample f = sample(p);
+    double lambda = kFirstDamping;
+    for (int trial = 0; trial < kMaxTrials && std::abs(f.value) > epsilon_; ++trial) {
+        const double g2 = f.gradient.squaredNorm();
+        if (!(g2 > kLeastGradient * kLeastGradient)) return std::nullopt;
+        Vec3 step = -f.value / ((1.0 + lambda) * g2) * f.gradient;
+        const double length = step.norm();
+        if (length > max_step_) step *= max_step_ / length;
+        const Sample next = sample(p + step);
+        if (std::abs(next.value) < std::abs(f.value)) {
+            p += step;
+            f = next;
+            lambda /= 10.0;
+        } else {
+            lambda *= 10.0;
+            if (lambda > kLargestDamping) return std::nullopt;
+        }
+    }
+    if (!(std::abs(f.value) <= epsilon_)) return std::nullopt;
+    return p;
+}
+
+Vec3 Surface::Probe::normal(const Vec3& p) {
+    const Vec3 gradient = sample(p).gradient;
+    const double length = gradient.norm();
+    if (!(length > 0.0)) return Vec3::Zero();
+    return gradient / length;
+}
+
+std::vector<Surface::Crossing> Surface::crossings() const {
+    std::vector<Crossing> result;
+    const Box box = bounds();
+    if (box.isEmpty()) return result;
+    const double h = resolution();
+    const Eigen::Array3i n = ((box.sizes() / h).array().ceil()).cast<int>() + 3;
+    const Vec3 origin = box.center() - 0.5 * h * (n - 1).cast<double>().matrix();
+    const auto access = probe();
+
+    // Two layers of values at a time: the layer x and the one after it.
+    const std::size_t layer_size = static_cast<std::size_t>(n.y()) * n.z();
+    std::vector<double> here(layer_size), next(layer_size);
+    const auto fill = [&](int x, std::vector<double>& layer) {
+        for (int y = 0; y < n.y(); ++y)
+            for (int z = 0; z < n.z(); ++z)
+                layer[static_cast<std::size_t>(y) * n.z() + z] = access->value(origin + h * Vec3(x, y, z));
+    };
+    const auto cross = [&](double a, double b, const Vec3& at, int axis) {
+        if ((a < 0.0) == (b < 0.0)) return;
+        const float direction = a < 0.0 ? 1.0f : -1.0f;
+        result.push_back({at + h * (a / (a - b)) * Vec3::Unit(axis), direction * Eigen::Vector3f::Unit(axis)});
+    };
+    fill(0, next);
+    for (int x = 0; x < n.x(); ++x) {
+        here.swap(next);
+        if (x + 1 < n.x()) fill(x + 1, next);
+        for (int y = 0; y < n.y(); ++y)
+            for (int z = 0; z < n.z(); ++z) {
+                const std::size_t i = static_cast<std::size_t>(y) * n.z() + z;
+                const Vec3 at = origin + h * Vec3(x, y, z);
+                if (x + 1 < n.x()) cross(here[i], next[i], at, 0);
+                if (y + 1 < n.y()) cross(here[i], here[i + n.z()], at, 1);
+                if (z + 1 < n.z()) cross(here[i], here[i + 1], at, 2);
+            }
+    }
+    return result;
+}
+
+}  // namespace isotrack

@@ -1,1 +1,325 @@
-// (to be written)
+#include "isotrack/tracking/mesh_sequence.h"
+
+#include <openvdb/tools/Interpolation.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <filesystem>
+#include <future>
+#include <memory>
+
+#include "isotrack/error.h"
+#include "isotrack/io/mesh_file.h"
+#include "isotrack/io/vdb_file.h"
+#include "isotrack/meshing/mesh_topology.h"
+#include "isotrack/meshing/self_intersections.h"
+#include "isotrack/surface/level_set.h"
+
+namespace isotrack {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+double peak_memory_mb() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+/// What the reading thread hands over: a level set, or why there is none.
+struct ReadFrame {
+    std::string grid_label;
+    std::unique_ptr<LevelSet> level_set;
+    openvdb::Vec3SGrid::ConstPtr velocity;
+    std::string failure;
+    double seconds = 0.0;
+};
+
+ReadFrame read_frame(const std::string& path, const MeshSequenceOptions& options) {
+    const auto start = Clock::now();
+    ReadFrame frame;
+    try {
+        const std::vector<GridInfo> grids = list_grids(path);
+        const GridInfo grid = choose_grid(grids, options.grid, path);
+        frame.grid_label = grid.label;
+        LevelSetOptions level_set_options;
+        level_set_options.iso = options.iso;
+        frame.level_set = std::make_unique<LevelSet>(read_grid(path, grid), level_set_options);
+        if (const auto velocity = choose_velocity_grid(grids, options.velocity_grid, path))
+            frame.velocity = openvdb::gridPtrCast<openvdb::Vec3SGrid>(read_grid(path, *velocity));
+    } catch (const std::exception& error) {
+        const std::string what = error.what();
+        frame.failure = what.find(path) == std::string::npos ? path + ": " + what : what;
+        frame.level_set.reset();
+    }
+    frame.seconds = seconds_since(start);
+    return frame;
+}
+
+/// One frame along the velocity field, by the midpoint rule. `frame_time` in the unit of time of the velocities.
+Tracker::Motion motion_along(const openvdb::Vec3SGrid::ConstPtr& velocity, double frame_time) {
+    const bool staggered = velocity->getGridClass() == openvdb::GRID_STAGGERED;
+    const auto at = [velocity, staggered](const Vec3& p) {
+        const openvdb::Vec3d index = velocity->worldToIndex(openvdb::Vec3d(p.x(), p.y(), p.z()));
+        // The tree itself is sampled: slower than an accessor, but free to use from any thread.
+        const openvdb::Vec3s v = staggered ? openvdb::tools::StaggeredBoxSampler::sample(velocity->constTree(), index)
+                                           : openvdb::tools::BoxSampler::sample(velocity->constTree(), index);
+        const Vec3 result(v.x(), v.y(), v.z());
+        return result.allFinite() ? result : Vec3(Vec3::Zero());
+    };
+    return [at, frame_time](const Vec3& p) { return Vec3(p + frame_time * at(p + 0.5 * frame_time * at(p))); };
+}
+
+void check_outputs(const InputSequence& input, const std::string& output, const MeshSequenceOptions& options) {
+    if (input.frames.empty()) throw OptionError("no input frames");
+    if (!is_mesh_extension(output))
+        throw OptionError("cannot tell a mesh format from '" + output + "'; end it in .ply, .obj, .off, .stl or .vtk");
+    if (input.frames.size() > 1 && !has_frame_field(output))
+        throw OptionError("'" + output + "' names one file for " + std::to_string(input.frames.size()) +
+                          " frames; put #### where the frame number goes");
+    if (!input.missing.empty() && options.on_missing == OnMissing::Stop)
+        throw OptionError("frame " + std::to_string(input.missing.front()) + " is missing" +
+                          (input.missing.size() > 1 ? " and " + std::to_string(input.missing.size() - 1) + " more" : ""));
+    if (options.on_existing == OnExisting::Refuse)
+        for (const InputFrame& frame : input.frames) {
+            const std::string path = expand_pattern(output, frame.number);
+            if (fs::exists(path)) throw OptionError("'" + path + "' exists; choose another output, --overwrite or --skip-existing");
+        }
+    if (options.fps && !(*options.fps > 0.0)) throw OptionError("the frame rate must be positive");
+    const fs::path folder = fs::path(expand_pattern(output, input.frames.front().number)).parent_path();
+    if (folder.empty()) return;
+    std::error_code failure;
+    fs::create_directories(folder, failure);
+    if (failure) throw OptionError("cannot make the folder '" + folder.string() + "': " + failure.message());
+}
+
+TrackerOptions tracker_options(const MeshSequenceOptions& options, double voxel_size) {
+    TrackerOptions result;
+    result.tolerance = options.tolerance.in_world(voxel_size);
+    result.angle_deg = options.angle_deg;
+    if (options.min_edge) result.min_edge = options.min_edge->in_world(voxel_size);
+    if (options.max_edge) result.max_edge = options.max_edge->in_world(voxel_size);
+    result.method = options.method;
+    result.reconstruction = options.reconstruction;
+    result.fit = options.fit;
+    result.seed = options.seed;
+    return result;
+}
+
+std::map<std::string, std::string> effective_settings(const MeshSequenceOptions& options, double voxel_size) {
+    const TrackerOptions t = tracker_options(options, voxel_size);
+    std::map<std::string, std::string> s;
+    const auto length = [&](double world) {
+        char text[96];
+        std::snprintf(text, sizeof text, "%.6g (%.4gvx)", world, world / voxel_size);
+        return std::string(text);
+    };
+    s["tolerance"] = length(t.tolerance);
+    s["min_edge"] = length(t.min_edge.value_or(0.5 * voxel_size));
+    s["max_edge"] = length(t.max_edge.value_or(40.0 * voxel_size));
+    s["angle"] = std::to_string(std::lround(t.angle_deg.value_or(default_angle_deg(t.method)))) + " degrees";
+    s["method"] = options.method == Method::Paper ? "paper" : "tolerance";
+    s["reconstruct"] = options.reconstruction == Reconstruction::Pure ? "pure" : "guided";
+    s["fit"] = options.fit ? "on" : "off";
+    s["seed"] = std::to_string(options.seed);
+    s["voxel_size"] = length(voxel_size);
+    if (options.iso != 0.0) s["iso"] = std::to_string(options.iso);
+    if (options.fps) s["fps"] = std::to_string(*options.fps);
+    return s;
+}
+
+void describe(const TrackedFrame& tracked, const LevelSet& level_set, double tolerance, FrameReport& row) {
+    const double voxel = level_set.voxel_size();
+    const MeshTopology topology = mesh_topology(tracked.mesh);
+    row.voxel_size = voxel;
+    row.active_voxels = level_set.active_voxels();
+    row.particles = tracked.particles;
+    row.vertices = tracked.mesh.points.size();
+    row.triangles = tracked.mesh.triangles.size();
+    row.components = topology.components;
+    row.euler = topology.euler;
+    row.closed = topology.closed() && topology.oriented();
+    row.manifold = topology.manifold();
+    row.self_intersections = self_intersections(tracked.mesh).size();
+    row.born = tracked.born;
+    row.died = tracked.died;
+    row.seeded = tracked.seeded;
+    row.lost = tracked.lost;
+    row.sweeps = tracked.sweeps;
+    row.relocated = tracked.relocated;
+    row.delaunay_strategy = tracked.delaunay_strategy;
+    row.max_error_vx = tracked.max_error / voxel;
+    row.rms_error_vx = tracked.rms_error / voxel;
+    const std::vector<double> angles = smallest_angles(tracked.mesh);
+    row.min_angle_deg = angles.empty() ? 0.0 : *std::min_element(angles.begin(), angles.end());
+    row.seconds = tracked.seconds;
+    if (tracked.mesh.empty()) {
+        row.status = "empty";
+    } else if (!tracked.within_tolerance) {
+        char text[128];
+        std::snprintf(text, sizeof text, "largest error %.4g voxels, tolerance %.4g", tracked.max_error / voxel, tolerance / voxel);
+        row.status = "tolerance_not_met";
+        row.message = text;
+    }
+}
+
+}  // namespace
+
+Length parse_length(const std::string& text) {
+    Length length;
+    std::string number = text;
+    if (number.size() > 2 && number.compare(number.size() - 2, 2, "vx") == 0) {
+        length.in_voxels = true;
+        number.resize(number.size() - 2);
+    }
+    std::size_t used = 0;
+    try {
+        length.value = std::stod(number, &used);
+    } catch (const std::exception&) {
+        used = 0;
+    }
+    if (used == 0 || used != number.size() || !(length.value > 0.0) || !std::isfinite(length.value))
+        throw OptionError("expected a positive length such as 0.5vx (voxels) or 0.01 (world units), got '" + text + "'");
+    return length;
+}
+
+std::string to_string(const Length& length) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%g%s", length.value, length.in_voxels ? "vx" : "");
+    return text;
+}
+
+RunReport mesh_sequence(const InputSequence& input, const std::string& output, const MeshSequenceOptions& options,
+                        const MeshSequenceEvents& events) {
+    check_outputs(input, output, options);
+    tracker_options(options, 1.0);
+    RunReport report;
+    report.version = ISOTRACK_VERSION;
+    std::optional<Tracker> tracker;
+    double tolerance = 0.0;
+    openvdb::Vec3SGrid::ConstPtr velocity;  // of the frame the particles are on
+    int tracked_frame = 0;
+
+    const auto skipped = [&](const InputFrame& frame) {
+        return options.on_existing == OnExisting::Skip && fs::exists(expand_pattern(output, frame.number));
+    };
+    const auto start_reading = [&](std::size_t i) {
+        if (i >= input.frames.size() || skipped(input.frames[i])) return std::future<ReadFrame>();
+        return std::async(std::launch::async, read_frame, input.frames[i].path, std::cref(options));
+    };
+
+    /// A frame whose mesh is being written.
+    struct Pending {
+        FrameReport row;
+        std::future<double> written;
+    };
+    std::optional<Pending> pending;
+    bool stop = false;
+    const auto finish = [&](FrameReport row) {
+        row.peak_memory_mb = peak_memory_mb();
+        report.frames.push_back(row);
+        if (events.finished) events.finished(report.frames.back());
+    };
+    const auto finish_pending = [&] {
+        if (!pending) return;
+        FrameReport row = std::move(pending->row);
+        auto written = std::move(pending->written);
+        pending.reset();
+        try {
+            row.seconds["write"] = written.get();
+        } catch (const std::exception& error) {
+            row.status = "failed";
+            row.message = error.what();
+            stop = true;  // a full disk does not get better with the next frame
+        }
+        finish(std::move(row));
+    };
+
+    std::future<ReadFrame> next = start_reading(0);
+    for (std::size_t i = 0; i < input.frames.size() && !stop; ++i) {
+        const auto start = Clock::now();
+        FrameReport row;
+        row.frame = input.frames[i].number;
+        row.time = options.fps ? (row.frame - input.frames.front().number) / *options.fps : row.frame;
+        row.input = input.frames[i].path;
+        row.output = expand_pattern(output, row.frame);
+        if (!next.valid()) {
+            finish_pending();
+            row.status = "skipped";
+            row.message = "output exists";
+            finish(std::move(row));
+            next = start_reading(i + 1);
+            continue;
+        }
+        ReadFrame read = next.get();
+        next = start_reading(i + 1);
+        row.grid = read.grid_label;
+        if (!read.level_set) {
+            finish_pending();
+            row.seconds["read"] = read.seconds;
+            row.status = "failed";
+            row.message = read.failure;
+            stop = stop || options.on_error == OnError::Stop;
+            finish(std::move(row));
+            continue;
+        }
+        if (!tracker) {
+            const TrackerOptions resolved = tracker_options(options, read.level_set->voxel_size());
+            tolerance = resolved.tolerance;
+            tracker.emplace(resolved);
+            report.settings = effective_settings(options, read.level_set->voxel_size());
+            if (events.started) events.started(report);
+        }
+        Tracker::Motion motion;
+        const int frames_passed = row.frame - tracked_frame;
+        if (velocity && frames_passed > 0) motion = motion_along(velocity, frames_passed / options.fps.value_or(1.0));
+        TrackedFrame tracked;
+        try {
+            tracked = tracker->advance(*read.level_set, motion);
+        } catch (const std::exception& error) {
+            finish_pending();
+            row.status = "failed";
+            row.message = row.input + ": " + error.what();
+            stop = stop || options.on_error == OnError::Stop;
+            finish(std::move(row));
+            continue;
+        }
+        const double per_time = options.fps.value_or(1.0) / std::max(1, frames_passed);
+        for (Vec3& v : tracked.mesh.velocities) v *= per_time;
+        velocity = read.velocity;
+        tracked_frame = row.frame;
+        describe(tracked, *read.level_set, tolerance, row);
+        row.seconds["read"] = read.seconds;
+        row.seconds["total"] = seconds_since(start);
+        finish_pending();
+        if (stop) break;
+        auto write = [mesh = std::move(tracked.mesh), path = row.output] {
+            const auto write_start = Clock::now();
+            write_mesh(mesh, path);
+            return seconds_since(write_start);
+        };
+        pending.emplace(Pending{std::move(row), std::async(std::launch::async, std::move(write))});
+    }
+    finish_pending();
+    return report;
+}
+
+int exit_code(const RunReport& report) {
+    std::size_t good = 0, failed = 0;
+    for (const FrameReport& row : report.frames) {
+        if (row.status == "failed") ++failed;
+        if ((row.status == "ok" && row.closed && row.manifold && row.self_intersections == 0) || row.status == "empty" ||
+            row.status == "skipped")
+            ++good;
+    }
+    if (good == report.frames.size()) return 0;
+    return failed == report.frames.size() ? 1 : 3;
+}
+
+}  // namespace isotrack

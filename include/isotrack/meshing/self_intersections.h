@@ -8,8 +8,12 @@
 
 namespace isotrack {
 
-/// Pairs (i < j, ascending) of triangles that share more than their common vertices and edges, decided exactly (CGAL). Vertices at the same
-/// place count as common, so that the copies that keep a mesh manifold do not intersect each other by touching.
+/// Pairs (i < j, ascending) of triangles that share more than their common vertices and edges, decided
+/// exactly (CGAL). Vertices at the same place count as common, so that the copies that keep a mesh manifold
+/// do not intersect each other by touching. Neighbours folded onto each other and a triangle given twice are
+/// pairs. Triangles without area take no part: in a closed mesh the neighbours on their edges touch what they
+/// touch. About 1 us per triangle and core; uses TBB inside. \throws InputError for a vertex that is not
+/// finite, or a triangle with an index outside `points`.
 std::vector<std::pair<int, int>> self_intersections(const TriangleMesh& mesh);
 
 }  // namespace isotrack

@@ -36,7 +36,7 @@ public:
     double resolution() const override;
     double reach() const override;
     Box bounds() const override;
-    std::vector<Vec3> crossings() const override;
+    std::vector<Crossing> crossings() const override;
 
     /// True when there is no surface: no sign change between neighbouring voxels.
     bool empty() const;

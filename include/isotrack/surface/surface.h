@@ -60,9 +60,15 @@ public:
     /// A box that holds the surface; empty when there is none.
     virtual Box bounds() const = 0;
 
-    /// Where the edges of a lattice of spacing `resolution()` cross the surface, linearly interpolated: every part of the
-    /// surface wider than a lattice cell holds such points. Always in the same order. This default scans `bounds()`.
-    virtual std::vector<Vec3> crossings() const;
+    /// Where a lattice edge crosses the surface.
+    struct Crossing {
+        Vec3 point;               ///< Linearly interpolated along the edge.
+        Eigen::Vector3f outward;  ///< Unit direction of the edge, from its end inside to its end outside.
+    };
+
+    /// The crossings of a lattice of spacing `resolution()`: every part of the surface wider than a lattice cell holds some. Always in
+    /// the same order. This default scans `bounds()`.
+    virtual std::vector<Crossing> crossings() const;
 };
 
 }  // namespace isotrack

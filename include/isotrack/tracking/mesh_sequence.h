@@ -19,7 +19,7 @@ struct Length {
     double in_world(double voxel_size) const { return in_voxels ? value * voxel_size : value; }
 };
 
-/// "0.5vx" or "0.01"; must be positive. \throws OptionError.
+/// "0.5vx" or "0.01"; must be positive and finite. \throws OptionError.
 Length parse_length(const std::string& text);
 std::string to_string(const Length& length);
 
@@ -29,25 +29,34 @@ enum class OnExisting { Refuse, Overwrite, Skip };
 
 struct MeshSequenceOptions {
     Length tolerance{0.5, true};
-    double angle_deg = 40.0;
+    std::optional<double> angle_deg;
     std::optional<Length> min_edge, max_edge;
     Method method = Method::Tolerance;
     Reconstruction reconstruction = Reconstruction::Guided;
+    bool fit = false;
     std::uint64_t seed = 1;
     std::optional<std::string> grid, velocity_grid;  ///< NAME or NAME[i]; unset: chosen by `choose_grid`.
     double iso = 0.0;
-    std::optional<double> fps;                       ///< > 0. Set: velocities per second; unset: per frame.
+    /// > 0. Set: velocities, read and written, are per second. Unset: per frame.
+    std::optional<double> fps;
     OnError on_error = OnError::Skip;
     OnMissing on_missing = OnMissing::Skip;
     OnExisting on_existing = OnExisting::Refuse;
 };
 
-/// Tracks `input` and writes one mesh per frame to `output` (a pattern with a number field, or a plain path for a single frame).
-/// Calls `on_frame` after each row, in order, from the calling thread. A frame that cannot be used becomes a row with status "failed"
-/// and its cause; the frames after it are tracked on from the last good one. The report holds a row for every input frame.
-/// \throws OptionError before any work: bad option, unknown extension, output without a number field, or outputs that exist.
+/// Called from the thread that runs the sequence.
+struct MeshSequenceEvents {
+    std::function<void(const RunReport&)> started;    ///< Once, when the first usable frame has fixed the effective settings.
+    std::function<void(const FrameReport&)> finished;  ///< After each frame, in order, when its file is in place.
+};
+
+/// Tracks `input` and writes one mesh per frame to `output` (a pattern with a number field, or a plain path for a single frame). The next
+/// frame is read and the last one written while a frame is tracked. A frame that cannot be used becomes a row with status "failed" and its
+/// cause; the frames after it are tracked on from the last good one. The report holds a row for every input frame that was reached.
+/// \throws OptionError before any work: bad option, unknown extension, output without a number field, outputs that exist, or gaps where
+/// they are not allowed.
 RunReport mesh_sequence(const InputSequence& input, const std::string& output, const MeshSequenceOptions& options,
-                        const std::function<void(const FrameReport&)>& on_frame = {});
+                        const MeshSequenceEvents& events = {});
 
 /// 0: every row is good; 1: no frame came through; 3: some frames failed or missed their checks.
 int exit_code(const RunReport& report);

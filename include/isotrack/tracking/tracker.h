@@ -16,7 +16,7 @@ namespace isotrack {
 
 enum class Method {
     Tolerance,  ///< Spacing from the measured error, fed back: fewest triangles for a tolerance.
-    Paper       ///< The paper's angle-driven metric, Gaussian energy, coordinate descent and thresholds.
+    Paper       ///< The paper's angle-driven metric, Gaussian energy, coordinate descent and thresholds; the tolerance is only checked.
 };
 
 enum class Reconstruction {
@@ -24,14 +24,18 @@ enum class Reconstruction {
     Pure     ///< The geometric convection of the particles alone, as in the paper; for comparison.
 };
 
+/// A bound that rarely matters beside a tolerance (60 degrees); what the whole spacing follows in the paper's method (20 degrees).
+double default_angle_deg(Method method);
+
 /// All lengths in world units.
 struct TrackerOptions {
     double tolerance = 0.0;              ///< > 0. Largest wanted distance between mesh and surface, either way.
-    double angle_deg = 40.0;             ///< Largest wanted angle between the normals of neighbours, degrees in (0, 90].
+    std::optional<double> angle_deg;     ///< Wanted angle between neighbours' normals, degrees in (0, 90]. Unset: `default_angle_deg`.
     std::optional<double> min_edge;      ///< Smallest spacing. Unset: half the surface's resolution.
     std::optional<double> max_edge;      ///< Largest spacing. Unset: 40 times the surface's resolution.
     Method method = Method::Tolerance;
     Reconstruction reconstruction = Reconstruction::Guided;
+    bool fit = false;                    ///< Vertices leave the surface so that the triangles are nearer to it; particles stay.
     std::uint64_t seed = 1;              ///< Same seed, same surfaces: same meshes, at any thread count.
 };
 

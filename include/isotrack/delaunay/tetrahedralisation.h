@@ -1,0 +1,81 @@
+// The Delaunay tetrahedralisation (DT) of moving particles.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "isotrack/sampling/adjacency.h"
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// A DT as flat arrays, for stages that only read it.
+struct Tetrahedra {
+    static constexpr int kInfinite = -1;  ///< The vertex that closes the hull.
+
+    /// Vertex k of facet f of a cell, f being the index of the opposite vertex: counter-clockwise seen from outside the cell.
+    static constexpr int kFacet[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+
+    std::vector<std::array<int, 4>> vertices;    ///< Per cell; positively oriented; at most one is kInfinite.
+    std::vector<std::array<int, 4>> neighbours;  ///< Per cell: the cell across the facet opposite vertex k.
+
+    std::size_t size() const { return vertices.size(); }
+    bool is_infinite(int cell) const {
+        const auto& v = vertices[cell];
+        return v[0] < 0 || v[1] < 0 || v[2] < 0 || v[3] < 0;
+    }
+    /// The index k of `vertex` in `cell`, which must have it.
+    int index_of(int cell, int vertex) const {
+        const auto& v = vertices[cell];
+        return v[0] == vertex ? 0 : v[1] == vertex ? 1 : v[2] == vertex ? 2 : 3;
+    }
+    /// The index, in neighbour k of `cell`, of the vertex across the common facet.
+    int mirror_index(int cell, int k) const {
+        const auto& back = neighbours[neighbours[cell][k]];
+        return back[0] == cell ? 0 : back[1] == cell ? 1 : back[2] == cell ? 2 : 3;
+    }
+};
+
+/// How a DT follows its points.
+enum class UpdateStrategy {
+    Rebuild  ///< Positions are only noted; `settle` builds anew. Neighbours are those of the last `settle`.
+};
+const char* name_of(UpdateStrategy strategy);
+
+/// Points that move, come and go, and their DT. Vertices are numbered by the caller's order and keep their number until they are removed.
+/// Between calls the DT may lag behind the points, as the strategy likes; after `settle` it is exact. Not for concurrent use.
+class Tetrahedralisation {
+public:
+    virtual ~Tetrahedralisation() = default;
+
+    /// Starts anew with vertex i at points[i].
+    virtual void assign(const std::vector<Vec3>& points) = 0;
+    /// Adds a vertex and returns its number: the count of vertices ever added. `near` is a vertex close by, or -1.
+    virtual int insert(const Vec3& point, int near) = 0;
+    virtual void move(int vertex, const Vec3& to) = 0;
+    virtual void remove(int vertex) = 0;
+
+    /// The vertices that share an edge with `vertex`, in no particular but reproducible order.
+    virtual void neighbours(int vertex, std::vector<int>& result) const = 0;
+
+    /// Makes the DT that of the points where they are now.
+    virtual void settle() = 0;
+
+    /// The cells as of the last `settle`, none when the points span no volume. A vertex on the very place of another belongs to no cell.
+    virtual const Tetrahedra& cells() const = 0;
+
+    /// Vertices relocated one by one since `assign`.
+    virtual std::size_t relocated() const = 0;
+};
+
+std::unique_ptr<Tetrahedralisation> make_tetrahedralisation(UpdateStrategy strategy);
+
+/// The DT of `points` at once. The order of the cells depends on the points alone.
+Tetrahedra tetrahedralise(const std::vector<Vec3>& points);
+
+/// Which of `count` vertices share an edge of the DT.
+Adjacency vertex_adjacency(const Tetrahedra& cells, std::size_t count);
+
+}  // namespace isotrack

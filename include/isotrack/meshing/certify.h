@@ -1,0 +1,28 @@
+// Holding a mesh against the surface, both ways.
+#pragma once
+
+#include <vector>
+
+#include "isotrack/surface/surface.h"
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// How far a triangle is from the surface. World units.
+struct TriangleError {
+    double largest = 0.0;  ///< Of |value| at the sample points.
+    double mean_square = 0.0;
+    Vec3 where = Vec3::Zero();  ///< The sample point with the largest.
+};
+
+/// Errors of each triangle at the points of a regular barycentric lattice with `steps` intervals per edge (>= 1): (steps+1)(steps+2)/2 points.
+/// Uses TBB inside; the result does not depend on the number of threads.
+std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                           const Surface& surface, int steps);
+
+/// Distance of every lattice crossing of the surface to the nearest triangle, in the order of `surface.crossings()`, world units. Exact up to
+/// `cutoff`; beyond it the entry is infinite.
+std::vector<double> crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                       const std::vector<Surface::Crossing>& crossings, double cutoff);
+
+}  // namespace isotrack

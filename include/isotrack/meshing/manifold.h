@@ -1,0 +1,31 @@
+// From labelled cells to a closed oriented 2-manifold.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "isotrack/meshing/convection.h"
+
+namespace isotrack {
+
+/// The boundary of the inside cells. Its triangles are facets of the DT, so they meet only in common vertices and edges.
+struct CarvedSurface {
+    std::vector<Triangle> triangles;  ///< Output vertices, counter-clockwise seen from outside.
+    std::vector<int> particle;        ///< Per output vertex: the particle it stands on; -1 for an edge midpoint.
+    std::vector<Vec3> midpoints;      ///< Positions of the output vertices that stand on no particle: the last ones, in order.
+    std::vector<int> inside_cell;     ///< Per triangle: the cell behind it; midpoints split a triangle, both halves keep its cell.
+    std::vector<int> inside_facet;    ///< Per triangle: the index of that cell's vertex opposite the facet.
+
+    std::size_t complex_edges = 0;    ///< Edges of the DT with four or more boundary facets.
+    std::vector<int> complex_edge_ends;  ///< Their particles, two per edge.
+    std::vector<int> pinched;         ///< Particles that needed more than one output vertex.
+    std::vector<int> unused;          ///< Particles of the DT on no boundary facet.
+};
+
+/// Every half-edge is mated with the one found by rotating through inside cells, so solids that touch stay apart; the corners that mates join
+/// form cycles, and each cycle becomes one output vertex [Guéziec et al. 2001, "Cutting and stitching", in a DT where the rotation is at
+/// hand]. Output vertices with particle index p come first, in the order of the particles, further copies after them. Where two different
+/// edges still join the same two output vertices, one of them is split at its midpoint. Always closed, oriented and manifold.
+CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std::vector<Vec3>& points);
+
+}  // namespace isotrack

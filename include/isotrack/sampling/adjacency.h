@@ -1,0 +1,27 @@
+// Who is next to whom.
+#pragma once
+
+#include <vector>
+
+namespace isotrack {
+
+/// Neighbours of every particle: those of i are adjacent[first[i]] to adjacent[first[i + 1] - 1], ascending. Symmetric.
+struct Adjacency {
+    std::vector<int> first{0};
+    std::vector<int> adjacent;
+
+    struct Range {
+        const int *from, *to;
+        const int* begin() const { return from; }
+        const int* end() const { return to; }
+        std::size_t size() const { return static_cast<std::size_t>(to - from); }
+    };
+    Range of(std::size_t i) const { return {adjacent.data() + first[i], adjacent.data() + first[i + 1]}; }
+    std::size_t size() const { return first.size() - 1; }
+};
+
+/// The groups of a colouring in which no two neighbours have the same colour, so that the members of a group can be treated at the same
+/// time. Greedy in the order of the particles: the same at any thread count.
+std::vector<std::vector<int>> colour_groups(const Adjacency& adjacency);
+
+}  // namespace isotrack

@@ -1,0 +1,40 @@
+// Births and deaths, with a dead zone between them so that the population does not flicker.
+#pragma once
+
+#include <vector>
+
+#include "isotrack/sampling/adjacency.h"
+#include "isotrack/sampling/particles.h"
+#include "isotrack/surface/surface.h"
+
+namespace isotrack {
+
+/// Thresholds relative to the spacing. In a hexagonal packing the nearest neighbour is at 1, the circumradius is 0.577. A death leaves an empty
+/// circle of the radius of the old distances, below `sparse`; a birth has its nearest neighbours at that radius, above `crowded`.
+struct PopulationBand {
+    double crowded = 0.65;  ///< Delete below this distance to the nearest neighbour.
+    double sparse = 0.85;   ///< Insert where a triangle's circumradius is above this.
+};
+
+/// Flags for `Particles::retain`: drops particles whose nearest neighbour facing the same way is too near, most crowded first, no two neighbours
+/// at once.
+std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency, const PopulationBand& band = {});
+
+/// Adds a particle at the projected circumcentre of triangles (of particle indices) that are too large, largest first, none beside another.
+/// Returns how many were added; they take the mean spacing of their triangle.
+std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& triangles, const Surface& surface, Id& next_id,
+                        const PopulationBand& band = {});
+
+/// A place where the mesh fails, and the spacing that would mend it.
+struct Shortage {
+    Vec3 place;
+    double spacing;  ///< World units.
+};
+
+/// Adds particles at the projections of `shortages`, in their order, at least half their spacing from particles that face the same way. Where
+/// one is nearer its own spacing shrinks instead, by 0.6 a call and down to `min_spacing`, so that repeated calls get denser. Returns how
+/// many were added plus how many shrank: 0 means that nothing more can be done.
+std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface, double min_spacing,
+                    Id& next_id);
+
+}  // namespace isotrack

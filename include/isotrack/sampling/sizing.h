@@ -1,0 +1,36 @@
+// The wanted spacing of the particles.
+#pragma once
+
+#include <vector>
+
+#include "isotrack/sampling/adjacency.h"
+#include "isotrack/sampling/particles.h"
+#include "isotrack/surface/surface.h"
+
+namespace isotrack {
+
+/// World units and radians; all > 0.
+struct SizingLimits {
+    double tolerance;            ///< Largest distance between mesh and surface.
+    double angle;                ///< Largest angle between the normals of neighbours.
+    double min_edge, max_edge;   ///< The spacing stays between these.
+    double angle_floor = 0.0;    ///< The angle alone asks for no spacing below this: at a sharp edge it would never be met.
+};
+
+/// What the mesh of the last build says about each particle. One entry per particle.
+struct SizingEvidence {
+    std::vector<double> error;      ///< Largest distance between the triangles around it and the surface; negative: not known.
+    std::vector<double> thickness;  ///< To the nearest Delaunay neighbour of opposite normal (the paper's th); infinite: none.
+};
+
+/// A first guess from the curvature of the surface at a point: the edge of an equilateral triangle whose error is the tolerance.
+double spacing_from_curvature(Surface::Probe& probe, const Vec3& p, const Vec3& n, double resolution, const SizingLimits& limits);
+
+/// The paper's k_nd: sqrt(max over neighbours on the same side of (1 - n_i . n_j) / r_ij^2), 1 / world units.
+double normal_deviation(const Particles& particles, const Adjacency& adjacency, std::size_t i);
+
+/// Feeds the measured error back: 1/h^2 grows in proportion to error / (share of the tolerance), by a factor of at most 2 either way; then the
+/// angle, the thickness and the limits bound it, and the gradation h_i <= h_j + 0.25 r_ij smooths it.
+void update_spacing(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence, const SizingLimits& limits);
+
+}  // namespace isotrack

@@ -1,0 +1,24 @@
+// One step of the paper's coordinate descent, shared by the parallel sweeps and the paper's own queue.
+#pragma once
+
+#include <limits>
+
+#include "isotrack/sampling/adjacency.h"
+#include "isotrack/sampling/particles.h"
+#include "isotrack/surface/surface.h"
+
+namespace isotrack {
+
+constexpr double kRestThreshold = 0.05;  ///< Of sigma: the paper's THRESHOLD. A particle that moved less is at rest.
+
+struct DescentStep {
+    double moved = 0.0;  ///< Distance moved over sigma, both in the metric.
+    double sigma = std::numeric_limits<double>::infinity();  ///< r_0 / sqrt(2) in the metric, before the step; infinite without neighbours.
+};
+
+/// The paper's algorithm 2 for particle i: a Levenberg-Marquardt step on the Gaussian energy of those `neighbours` that face the same way and
+/// are within 2 sigma, in the tangent plane, in the metric d^2 = (k_i^2 + k_j^2) / 2 |r|^2 with k = 1 / spacing; projected by O1; undone unless the
+/// energy falls. `lambda` is the particle's damping, kept from step to step.
+DescentStep descend(Particles& particles, Adjacency::Range neighbours, int i, double& lambda, Surface::Probe& probe);
+
+}  // namespace isotrack
