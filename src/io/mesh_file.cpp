@@ -11,8 +11,13 @@
 #include <CGAL/Simple_cartesian.h>
 #include <fmt/format.h>
 
+// OpenMesh makes points without values on purpose; gcc 12 takes that for a slip.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #include <OpenMesh/Core/IO/MeshIO.hh>
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
+#pragma GCC diagnostic pop
+
 #include <algorithm>
 #include <cassert>
 #include <cctype>

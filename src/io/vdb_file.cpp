@@ -1,8 +1,8 @@
 // OpenVDB 10 believes every length a file states: 300 bytes of a file cut off inside its header make it ask
-// for gigabytes, and after the end of a file its loops run on over whatever is in memory. So the head of the
-// file is read here, each length checked against what is left, and OpenVDB gets only what holds voxels:
-// transform, topology and buffers of one grid, from a stream that throws at its end. Format:
-// openvdb/io/Archive.cc, io/GridDescriptor.cc and MetaMap.cc of OpenVDB 10.0.1.
+// for gigabytes, and a block of voxels with a wrong length overruns its buffer. So the head of the file is
+// read here, each length checked against what is left, the tree is checked by `check_vdb_tree`, and OpenVDB
+// gets the checked bytes of one grid's tree and nothing else. Format: openvdb/io/Archive.cc,
+// io/GridDescriptor.cc and MetaMap.cc of OpenVDB 10.0.1.
 #include "isotrack/io/vdb_file.h"
 
 #include <fmt/format.h>
@@ -21,6 +21,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "io/vdb_tree_check.h"
 #include "isotrack/error.h"
 
 namespace isotrack {
@@ -73,10 +74,11 @@ struct Record {
     std::string type;         ///< OpenVDB's: "Tree_float_5_4_3".
     std::string parent;       ///< Unique name of the grid whose tree this one shares; mostly empty.
     bool half = false;
-    std::int64_t grid_pos = 0, end_pos = 0;
+    std::int64_t grid_pos = 0, tree_pos = 0, end_pos = 0;
+    std::uint32_t compression = 0;
     openvdb::MetaMap metadata;
-    std::string transform;
-    double voxel_size = 0.0;
+    openvdb::math::Transform::Ptr transform;  ///< Null where OpenVDB cannot make it; then the cause follows.
+    std::string transform_error;
 
     std::string name() const { return GridDescriptor::stripSuffix(unique_name); }
     std::string shown_name() const { return GridDescriptor::nameAsString(unique_name); }
@@ -96,6 +98,55 @@ std::string transform_name(const openvdb::math::Transform& transform) {
     return type;
 }
 
+/// "float" for OpenVDB's "Tree_float_5_4_3"; trees of another shape keep their full name, since nothing here
+/// can read them.
+std::string short_type(const std::string& type) {
+    constexpr std::string_view kPrefix = "Tree_", kShape = "_5_4_3";
+    if (type.size() <= kPrefix.size() + kShape.size() || type.rfind(kPrefix, 0) != 0 ||
+        type.compare(type.size() - kShape.size(), kShape.size(), kShape) != 0)
+        return printable(type);
+    const std::string value = type.substr(kPrefix.size(), type.size() - kPrefix.size() - kShape.size());
+    return value == "ptdataidx32" ? "points" : printable(value);
+}
+
+/// nullopt for a type that is of no use here, and that is not known well enough to be given to OpenVDB.
+std::optional<VdbValueLayout> layout_of(const Record& record) {
+    const std::string type = short_type(record.type);
+    const std::size_t components = type == "float" || type == "double" ? 1 : 3;
+    const bool is_float = type == "float" || type == "vec3s";
+    if (!is_float && type != "double" && type != "vec3d") return std::nullopt;
+    // As OpenVDB has it: what counts is the metadata, not the type's suffix.
+    const auto half = record.metadata[openvdb::GridBase::META_SAVE_HALF_FLOAT];
+    VdbValueLayout layout{};
+    layout.half = half && half->asBool();
+    layout.value_bytes = components * (is_float ? sizeof(float) : sizeof(double));
+    layout.stored_bytes = layout.half ? components * sizeof(openvdb::math::half) : layout.value_bytes;
+    layout.compression = record.compression;
+    return layout;
+}
+
+/// Lets a stream read from memory without a copy.
+class MemoryBuffer : public std::streambuf {
+public:
+    explicit MemoryBuffer(const std::string& bytes) {
+        char* begin = const_cast<char*>(bytes.data());  // a get area is never written to
+        setg(begin, begin, begin + bytes.size());
+    }
+
+private:
+    pos_type seekoff(off_type offset, std::ios_base::seekdir direction, std::ios_base::openmode) override {
+        const off_type from = direction == std::ios_base::beg   ? 0
+                              : direction == std::ios_base::cur ? gptr() - eback()
+                                                                : egptr() - eback();
+        return seekpos(from + offset, std::ios_base::in);
+    }
+    pos_type seekpos(pos_type position, std::ios_base::openmode) override {
+        if (off_type(position) < 0 || off_type(position) > egptr() - eback()) return pos_type(off_type(-1));
+        setg(eback(), eback() + off_type(position), egptr());
+        return position;
+    }
+};
+
 class VdbFile {
 public:
     /// Opens the file and checks header and directory.
@@ -110,8 +161,8 @@ public:
 
     const std::vector<Record>& grids() const { return grids_; }
 
-    /// The grids of a file written as a stream lie one behind the other without a directory: all must be read
-    /// to find them.
+    /// The grids of a file written as a stream lie one behind the other: the end of one must be found to find
+    /// the next.
     void find_streamed_grids();
 
     openvdb::GridBase::Ptr read(const Record& record);
@@ -125,6 +176,7 @@ private:
     void read_transform(Record& record);
     openvdb::MetaMap read_metadata(const std::string& owner);
     void read_entry(openvdb::MetaMap& metadata, const std::string& name, const std::string& type);
+    std::string tree_bytes(const Record& record);
     openvdb::GridBase::Ptr read_voxels(const Record& record);
 
     std::int64_t position() { return static_cast<std::int64_t>(stream_.tellg()); }
@@ -161,7 +213,6 @@ private:
     bool has_offsets_ = true;
     std::int32_t grid_count_ = 0;
     std::vector<Record> grids_;
-    openvdb::io::StreamMetadata::Ptr stream_metadata_;  ///< OpenVDB keeps a pointer to it in the stream.
 };
 
 void VdbFile::check_kind() {
@@ -245,7 +296,7 @@ void VdbFile::read_head(Record& record) {
     limit_ = record.end_pos;
     stream_.seekg(record.grid_pos);
     const std::string owner = fmt::format("grid '{}'", record.shown_name());
-    number<std::uint32_t>(owner);  // compression
+    record.compression = number<std::uint32_t>(owner);
     record.metadata = read_metadata(owner);
     // The transform's type is the last string that OpenVDB will read without looking at its length.
     const std::int64_t transform_pos = position();
@@ -259,14 +310,16 @@ void VdbFile::read_head(Record& record) {
 void VdbFile::read_transform(Record& record) {
     try {
         openvdb::io::setVersion(stream_, library_version_, file_version_);
-        openvdb::math::Transform transform;
-        transform.read(stream_);
-        const double voxel_size = transform.isLinear() ? std::cbrt(transform.voxelVolume()) : 0.0;
-        record.transform = transform_name(transform);
-        if (std::isfinite(voxel_size)) record.voxel_size = voxel_size;
-    } catch (const std::exception&) {
+        auto transform = openvdb::math::Transform::createLinearTransform();
+        transform->read(stream_);
+        record.tree_pos = position();
+        if (record.tree_pos <= record.end_pos)
+            record.transform = transform;
+        else
+            record.transform_error = "it reaches beyond the end of the grid";
+    } catch (const std::exception& error) {
         stream_.clear();
-        record.transform.clear();
+        record.transform_error = error.what();
     }
 }
 
@@ -297,20 +350,27 @@ void VdbFile::read_entry(openvdb::MetaMap& metadata, const std::string& name, co
 
 void VdbFile::find_streamed_grids() {
     if (has_offsets_) return;
-    for (std::size_t i = 0; i < grids_.size(); ++i) {
-        try {
-            read_voxels(grids_[i]);
-        } catch (const std::exception&) {
-            return;  // where the next grid begins is not known
-        }
-        grids_[i].end_pos = position();
-        if (static_cast<std::int32_t>(i + 1) == grid_count_) return;
-        Record next = read_descriptor(static_cast<std::int32_t>(i + 1));
+    for (std::int32_t i = 1; i < grid_count_; ++i) {
+        Record& last = grids_.back();
+        const std::optional<VdbValueLayout> layout = layout_of(last);
+        if (!layout || !last.transform) return;  // where the next grid begins is not known
+        const std::size_t length = last.parent.empty() ? check_vdb_tree(tree_bytes(last), 0, *layout) : 0;
+        last.end_pos = last.tree_pos + static_cast<std::int64_t>(length);
+        stream_.seekg(last.end_pos);
+        Record next = read_descriptor(i);
         next.grid_pos = position();
         next.end_pos = size_;
         read_head(next);
         grids_.push_back(std::move(next));
     }
+}
+
+std::string VdbFile::tree_bytes(const Record& record) {
+    limit_ = size_;
+    stream_.seekg(record.tree_pos);
+    std::string bytes(static_cast<std::size_t>(record.end_pos - record.tree_pos), '\0');
+    stream_.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    return bytes;
 }
 
 openvdb::GridBase::Ptr VdbFile::read(const Record& record) {
@@ -326,54 +386,39 @@ openvdb::GridBase::Ptr VdbFile::read(const Record& record) {
     return grid;
 }
 
-/// What `openvdb::io::Archive::readGrid` does, with the metadata that was checked.
+/// What `openvdb::io::Archive::readGrid` does, with the metadata and the transform that were read here, and a
+/// tree that was checked.
 openvdb::GridBase::Ptr VdbFile::read_voxels(const Record& record) {
-    if (!openvdb::GridBase::isRegistered(record.type))
-        fail(path_, fmt::format("grid '{}' is of type '{}', which OpenVDB {} cannot read",
-                                record.shown_name(), record.type, openvdb::getLibraryVersionString()));
+    const std::optional<VdbValueLayout> layout = layout_of(record);
+    if (!layout)
+        fail(path_, fmt::format("grid '{}' is of type {}; only float, double, vec3s and vec3d can be read",
+                                record.shown_name(), short_type(record.type)));
+    if (!record.transform)
+        fail(path_, fmt::format("the transform of grid '{}' cannot be read: {}", record.shown_name(),
+                                record.transform_error));
     const openvdb::GridBase::Ptr grid = openvdb::GridBase::createGrid(record.type);
     grid->clearMetadata();
     grid->insertMeta(record.metadata);
-
-    stream_.clear();
-    stream_.seekg(record.grid_pos);
-    const auto compression = number<std::uint32_t>("the compression");
-    read_metadata("a grid");  // to get past it
-
-    stream_metadata_ = std::make_shared<openvdb::io::StreamMetadata>();
-    openvdb::io::setStreamMetadataPtr(stream_, stream_metadata_, false);
-    openvdb::io::setVersion(stream_, library_version_, file_version_);
-    openvdb::io::setDataCompression(stream_, compression);
-    openvdb::io::setGridClass(stream_, grid->getGridClass());
-    openvdb::io::setGridBackgroundValuePtr(stream_, nullptr);
-    stream_metadata_->setSeekable(true);
-    stream_metadata_->setHalfFloat(record.half);
-    stream_metadata_->gridMetadata() = record.metadata;
-
-    grid->readTransform(stream_);
+    grid->setTransform(record.transform);
     if (!record.parent.empty()) return grid;
-    const std::int64_t tree_pos = position();
-    if (number<std::uint32_t>("the tree") != 1)  // OpenVDB would print a warning and read on
-        fail(path_,
-             fmt::format("damaged: the tree of grid '{}' does not begin as it must", record.shown_name()));
-    stream_.seekg(tree_pos);
-    grid->readTopology(stream_);
-    grid->readBuffers(stream_);
-    if (position() > record.end_pos)
-        fail(path_,
-             fmt::format("damaged: the voxels of grid '{}' reach beyond its end", record.shown_name()));
-    return grid;
-}
 
-/// "float" for OpenVDB's "Tree_float_5_4_3"; trees of another shape keep their full name, since nothing here
-/// can read them.
-std::string short_type(const std::string& type) {
-    constexpr std::string_view kPrefix = "Tree_", kShape = "_5_4_3";
-    if (type.size() <= kPrefix.size() + kShape.size() || type.rfind(kPrefix, 0) != 0 ||
-        type.compare(type.size() - kShape.size(), kShape.size(), kShape) != 0)
-        return printable(type);
-    const std::string value = type.substr(kPrefix.size(), type.size() - kPrefix.size() - kShape.size());
-    return value == "ptdataidx32" ? "points" : printable(value);
+    const std::string bytes = tree_bytes(record);
+    check_vdb_tree(bytes, 0, *layout);
+    MemoryBuffer buffer(bytes);
+    std::istream stream(&buffer);
+    stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+    auto stream_metadata =
+        std::make_shared<openvdb::io::StreamMetadata>();  // the stream keeps a pointer to this pointer
+    openvdb::io::setStreamMetadataPtr(stream, stream_metadata, false);
+    openvdb::io::setVersion(stream, library_version_, file_version_);
+    openvdb::io::setDataCompression(stream, record.compression);
+    openvdb::io::setGridClass(stream, grid->getGridClass());
+    openvdb::io::setGridBackgroundValuePtr(stream, nullptr);
+    stream_metadata->setSeekable(true);
+    stream_metadata->setHalfFloat(grid->saveFloatAsHalf());
+    grid->readTopology(stream);
+    grid->readBuffers(stream);
+    return grid;
 }
 
 GridInfo describe(const Record& record) {
@@ -381,8 +426,11 @@ GridInfo describe(const Record& record) {
     info.name = record.name();
     info.type = short_type(record.type);
     info.half = record.half;
-    info.transform = printable(record.transform);
-    info.voxel_size = record.voxel_size;
+    if (record.transform) {
+        info.transform = transform_name(*record.transform);
+        const double size = record.transform->isLinear() ? std::cbrt(record.transform->voxelVolume()) : 0.0;
+        if (std::isfinite(size)) info.voxel_size = size;
+    }
     const auto grid_class =
         record.metadata.getMetadata<openvdb::StringMetadata>(openvdb::GridBase::META_GRID_CLASS);
     info.grid_class = openvdb::GridBase::gridClassToString(

@@ -382,9 +382,7 @@ std::vector<std::string> small_files(const support::TempFolder& temp) {
         grid->setSaveFloatAsHalf(compression == openvdb::io::COMPRESS_ACTIVE_MASK);
         for (int i = 0; i < 20; ++i)
             grid->tree().setValue({i % 5, i % 7, i % 3}, 0.1f * static_cast<float>(i) - 1.0f);
-        auto twin = grid->copy();  // shares the tree
-        twin->setName("");
-        write_vdb(temp.file("small.vdb"), {grid, twin}, compression);
+        write_vdb(temp.file("small.vdb"), {grid}, compression);
         files.push_back(read_bytes(temp.file("small.vdb")));
     }
     return files;
@@ -392,21 +390,33 @@ std::vector<std::string> small_files(const support::TempFolder& temp) {
 
 TEST_F(VdbFileTest, SurvivesACutAtEveryByte) {
     const double before = peak_megabytes();
-    for (const std::string& bytes : small_files(temp_))
-        for (std::size_t length = 0; length < bytes.size(); ++length)
-            ASSERT_FALSE(opens(with(bytes.substr(0, length)))) << "cut after " << length << " bytes";
+    for (const std::string& bytes : small_files(temp_)) {
+        with(bytes);
+        for (std::size_t length = bytes.size(); length-- > 0;) {
+            fs::resize_file(file(), length);
+            ASSERT_FALSE(opens(file())) << "cut after " << length << " bytes";
+        }
+    }
     EXPECT_LT(peak_megabytes() - before, 100.0);
 }
 
 TEST_F(VdbFileTest, SurvivesDamageAtEveryByte) {
     const double before = peak_megabytes();
-    for (const std::string& bytes : small_files(temp_))
-        for (std::size_t at = 0; at < bytes.size(); ++at)
-            for (const int flip : {0x01, 0x80, 0xff}) {
-                std::string damaged = bytes;
-                damaged[at] = static_cast<char>(damaged[at] ^ flip);
-                opens(with(damaged));
+    for (const std::string& bytes : small_files(temp_)) {
+        std::fstream stream(with(bytes), std::ios::in | std::ios::out | std::ios::binary);
+        const auto put = [&](std::size_t at, int value) {
+            stream.seekp(static_cast<std::streamoff>(at)).put(static_cast<char>(value)).flush();
+        };
+        for (std::size_t at = 0; at < bytes.size(); ++at) {
+            // Most bytes are zero, parts of masks and lengths: one huge value is enough for them.
+            for (const int flip :
+                 bytes[at] == 0 ? std::vector<int>{0xff} : std::vector<int>{0x01, 0x80, 0xff}) {
+                put(at, bytes[at] ^ flip);
+                opens(file());
             }
+            put(at, bytes[at]);
+        }
+    }
     EXPECT_LT(peak_megabytes() - before, 400.0);
 }
 
@@ -487,6 +497,10 @@ TEST_F(SharedVdb, EachIsListedAndReadOrRefusedInOneLine) {
             const std::vector<GridInfo> grids = list_grids(path);
             EXPECT_FALSE(grids.empty()) << path;
             for (const GridInfo& grid : grids) {
+                if (grid.type != "float" && grid.type != "double" && grid.type != "vec3s") {
+                    EXPECT_NE(refusal(path, [&] { read_grid(path, grid); }).find("type"), std::string::npos);
+                    continue;
+                }
                 const openvdb::GridBase::Ptr read = read_grid(path, grid);
                 EXPECT_EQ(read->getName(), grid.name) << path;
                 EXPECT_EQ(read->activeVoxelCount(), grid.active_voxels.value_or(read->activeVoxelCount()))
@@ -523,7 +537,7 @@ TEST_F(SharedVdb, ChoosesTheLiquidOfASimulation) {
     const auto points =
         std::find_if(grids.begin(), grids.end(), [](const GridInfo& g) { return g.type == "points"; });
     ASSERT_NE(points, grids.end());
-    EXPECT_NE(refusal(path, [&] { read_grid(path, *points); }).find("int32_trnc"), std::string::npos);
+    EXPECT_NE(refusal(path, [&] { read_grid(path, *points); }).find("points"), std::string::npos);
 }
 
 TEST_F(SharedVdb, DoesNotGuessAmongSeveralLevelSets) {

@@ -16,8 +16,9 @@ bool is_mesh_extension(const std::string& path);
 /// \throws IoError naming the path and the cause; OptionError for an unknown extension or an id beyond 2^31 - 1.
 void write_mesh(const TriangleMesh& mesh, const std::string& path);
 
-/// Reads any format OpenMesh reads, plus id and velocity from a PLY written by `write_mesh`. Polygons become fans; faces that would
-/// make a complex edge are kept: the result is the file's face list, not a repaired mesh.
+/// Reads PLY, OBJ, OFF and STL, plus id and velocity from a PLY as `write_mesh` makes it. Polygons become fans; degenerate faces and
+/// those that would make a complex edge are kept: the result is the file's face list, not a repaired mesh. Only the corners of STL,
+/// which has no indices, are merged where they are equal.
 /// \throws IoError naming the path and the cause.
 TriangleMesh read_mesh(const std::string& path);
 
