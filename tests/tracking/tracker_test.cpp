@@ -1,1 +1,404 @@
+// One surface after the other: what stays the same from frame to frame, and what every frame promises.
+#include "isotrack/tracking/tracker.h"
+
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <set>
+#include <vector>
+
+#include "isotrack/error.h"
+#include "isotrack/meshing/mesh_topology.h"
+#include "isotrack/meshing/self_intersections.h"
+#include "isotrack/surface/level_set.h"
+#include "isotrack/surface/rasterise.h"
+#include "isotrack/surface/shapes.h"
+#include "support/distance.h"
+
+namespace isotrack {
+namespace {
+
+using shapes::SurfacePtr;
+constexpr double kVoxel = 0.05;
+
+TrackerOptions with_tolerance(double tolerance) {
+    TrackerOptions options;
+    options.tolerance = tolerance;
+    return options;
+}
+
+class EmptySurface final : public Surface {
+public:
+    std::unique_ptr<Surface::Probe> probe() const override { return std::make_unique<Nothing>(); }
+    double resolution() const override { return kVoxel; }
+    Box bounds() const override { return {}; }
+
+private:
+    struct Nothing final : Surface::Probe {
+        Nothing() : Probe(1e-9, kVoxel) {}
+        double value(const Vec3&) override { return 1.0; }
+        Surface::Sample sample(const Vec3&) override { return {1.0, Vec3::Zero()}; }
+    };
+};
+
+/// What is promised of every frame, whatever the surface.
+void expect_sound(const TrackedFrame& frame, std::size_t components, long euler, const std::string& where) {
+    SCOPED_TRACE(where);
+    const MeshTopology t = mesh_topology(frame.mesh);
+    EXPECT_TRUE(t.closed());
+    EXPECT_TRUE(t.oriented());
+    EXPECT_TRUE(t.manifold());
+    EXPECT_EQ(t.unused_vertices, 0u);
+    EXPECT_EQ(t.components, components);
+    EXPECT_EQ(t.euler, euler);
+    EXPECT_EQ(self_intersections(frame.mesh).size(), 0u);
+    EXPECT_GE(enclosed_volume(frame.mesh), 0.0);
+    EXPECT_EQ(frame.mesh.ids.size(), frame.mesh.points.size());
+    EXPECT_EQ(frame.mesh.velocities.size(), frame.mesh.points.size());
+    const std::set<Id> ids(frame.mesh.ids.begin(), frame.mesh.ids.end());
+    EXPECT_EQ(ids.size(), frame.mesh.ids.size());
+    for (const Vec3& v : frame.mesh.velocities) EXPECT_TRUE(v.allFinite());
+    for (const Vec3& p : frame.mesh.points)
+        EXPECT_EQ(p, Vec3(p.cast<float>().cast<double>())) << "not what a file can hold";
+}
+
+/// Largest distance from the mesh to the surface, at many points of every triangle, by the surface's own
+/// exact distance.
+double mesh_to_surface(const TriangleMesh& mesh, const Surface& surface) {
+    constexpr int kSteps = 12;
+    const auto probe = surface.probe();
+    double largest = 0.0;
+    for (const auto& [a, b, c] : mesh.triangles)
+        for (int i = 0; i <= kSteps; ++i)
+            for (int j = 0; i + j <= kSteps; ++j) {
+                const Vec3 p =
+                    (i * mesh.points[a] + j * mesh.points[b] + (kSteps - i - j) * mesh.points[c]) / kSteps;
+                largest = std::max(largest, std::abs(probe->value(p)));
+            }
+    return largest;
+}
+
+/// Largest distance from the surface to the mesh, at every `stride`-th of its lattice crossings, put onto the
+/// surface.
+double surface_to_mesh(const Surface& surface, const TriangleMesh& mesh, std::size_t stride) {
+    const auto probe = surface.probe();
+    const auto crossings = surface.crossings();
+    double largest = 0.0;
+    for (std::size_t i = 0; i < crossings.size(); i += stride)
+        if (const auto p = probe->project(crossings[i].point))
+            largest = std::max(largest, support::distance_to_mesh(*p, mesh));
+    return largest;
+}
+
+SurfacePtr sphere_at(const Vec3& centre, double radius = 1.0) {
+    return shapes::sphere(centre, radius, kVoxel);
+}
+
+SurfacePtr two_drops(double half_distance) {
+    return shapes::blended_spheres({-half_distance, 0, 0}, 0.5, {half_distance, 0, 0}, 0.5, 0.15, kVoxel);
+}
+
+TEST(Tracker, KeepsTheToleranceOnAMovingSphere) {
+    for (const double tolerance : {0.03, 0.005}) {
+        Tracker tracker(with_tolerance(tolerance));
+        for (int f = 0; f < 5; ++f) {
+            const auto sphere = sphere_at({0.03 * f, 0.01 * f, -0.02 * f});
+            const TrackedFrame frame = tracker.advance(*sphere);
+            expect_sound(frame, 1, 2, "frame " + std::to_string(f));
+            EXPECT_TRUE(frame.within_tolerance);
+            EXPECT_EQ(frame.lost_crossings, 0u);
+            EXPECT_LE(frame.max_error, tolerance);
+            EXPECT_LE(frame.rms_error, frame.max_error);
+            const double there = mesh_to_surface(frame.mesh, *sphere),
+                         back = surface_to_mesh(*sphere, frame.mesh, 29);
+            EXPECT_LE(there, tolerance) << "frame " << f;
+            EXPECT_LE(back, tolerance) << "frame " << f;
+            // What it says of itself is what is measured: 28 points of a triangle see nearly the largest
+            // error.
+            EXPECT_NEAR(frame.max_error, std::max(there, back), 0.1 * tolerance);
+        }
+    }
+}
+
+TEST(Tracker, UsesFewTrianglesForATolerance) {
+    // An equilateral triangle of edge h is h^2 / 6 from the unit sphere it is inscribed in.
+    const double tolerance = 0.01, h2 = 6.0 * tolerance;
+    const double ideal = 4.0 * 3.141592653589793 / (std::sqrt(3.0) / 4.0 * h2);
+    const TrackedFrame frame = Tracker(with_tolerance(tolerance)).advance(*sphere_at(Vec3::Zero()));
+    EXPECT_LT(static_cast<double>(frame.mesh.triangles.size()), 2.0 * ideal);
+    auto angles = smallest_angles(frame.mesh);
+    std::sort(angles.begin(), angles.end());
+    EXPECT_GE(angles.front(), 15.0);
+    EXPECT_GE(angles[angles.size() / 100], 30.0);
+}
+
+TEST(Tracker, MergesAndSplitsDrops) {
+    Tracker tracker(with_tolerance(0.01));
+    const double distances[] = {0.7, 0.66, 0.55, 0.5, 0.45, 0.5, 0.55, 0.66, 0.7};
+    const std::size_t drops[] = {2, 2, 1, 1, 1, 1, 1, 2, 2};
+    for (int f = 0; f < 9; ++f) {
+        const auto surface = two_drops(distances[f]);
+        const TrackedFrame frame = tracker.advance(*surface);
+        expect_sound(frame, drops[f], 2 * static_cast<long>(drops[f]), "frame " + std::to_string(f));
+        EXPECT_LE(mesh_to_surface(frame.mesh, *surface), 0.01) << f;
+        EXPECT_LE(surface_to_mesh(*surface, frame.mesh, 17), 0.01) << f;
+    }
+}
+
+TEST(Tracker, FindsWhatIsBornAndDropsWhatDies) {
+    Tracker tracker(with_tolerance(0.01));
+    const auto large = sphere_at({0, 0, 0}),
+               both = shapes::unite({sphere_at({0, 0, 0}), sphere_at({1.4, 0, 0}, 0.1)});
+    expect_sound(tracker.advance(*large), 1, 2, "alone");
+    const TrackedFrame born = tracker.advance(*both);
+    expect_sound(born, 2, 4, "born");
+    EXPECT_GT(born.seeded, 0u);
+    EXPECT_GT(born.born, 0u);
+    EXPECT_LE(surface_to_mesh(*both, born.mesh, 17), 0.01);
+    const TrackedFrame died = tracker.advance(*large);
+    expect_sound(died, 1, 2, "died");
+    EXPECT_GT(died.died, 0u);
+}
+
+TEST(Tracker, KeepsTheVoidOfAGrowingShell) {
+    Tracker tracker(with_tolerance(0.01));
+    for (int f = 0; f < 4; ++f) {
+        const auto shell = shapes::shell({0, 0, 0}, 0.7 + 0.04 * f, 0.2, kVoxel);
+        expect_sound(tracker.advance(*shell), 2, 4, "frame " + std::to_string(f));
+    }
+}
+
+TEST(Tracker, KeepsTheHoleOfATumblingTorusOnAGrid) {
+    Tracker tracker(with_tolerance(0.5 * kVoxel));
+    const auto torus = shapes::torus({0, 0, 0}, 0.7, 0.25, kVoxel);
+    for (int f = 0; f < 4; ++f) {
+        const Eigen::Isometry3d motion(Eigen::AngleAxisd(0.1 * f, Vec3(1, 2, 3).normalized()));
+        const LevelSet level_set(rasterise(*shapes::moved(torus, motion), kVoxel));
+        const TrackedFrame frame = tracker.advance(level_set);
+        expect_sound(frame, 1, 0, "frame " + std::to_string(f));
+        EXPECT_TRUE(frame.within_tolerance);
+        EXPECT_LE(mesh_to_surface(frame.mesh, level_set),
+                  0.5 * kVoxel * 1.02);  // between the points that were certified
+    }
+}
+
+TEST(Tracker, NeverReusesAnId) {
+    Tracker tracker(with_tolerance(0.01));
+    std::set<Id> gone, alive;
+    const double distances[] = {0.7, 0.66, 0.55, 0.45, 0.55, 0.66, 0.7, 0.5};
+    for (const double d : distances) {
+        const TrackedFrame frame = tracker.advance(*two_drops(d));
+        const Particles& particles = tracker.particles();
+        const std::set<Id> now(particles.id.begin(), particles.id.end());
+        EXPECT_EQ(now.size(), particles.size());
+        EXPECT_EQ(frame.particles, particles.size());
+        std::size_t born = 0, died = 0;
+        for (const Id id : now) {
+            EXPECT_EQ(gone.count(id), 0u);
+            EXPECT_GE(id, 0);
+            born += alive.count(id) == 0;
+        }
+        for (const Id id : alive)
+            if (now.count(id) == 0) {
+                gone.insert(id);
+                ++died;
+            }
+        EXPECT_EQ(frame.born, born);
+        EXPECT_EQ(frame.died, died);
+        // A vertex has the id of its particle.
+        for (std::size_t v = 0; v < frame.mesh.ids.size(); ++v)
+            if (frame.mesh.ids[v] <= *now.rbegin()) {
+                EXPECT_EQ(now.count(frame.mesh.ids[v]), 1u);
+            }
+        alive = now;
+    }
+}
+
+TEST(Tracker, KeepsMostIdsWhenTheMotionIsSlow) {
+    Tracker tracker(with_tolerance(0.01));
+    std::set<Id> before;
+    for (int f = 0; f < 6; ++f) {
+        tracker.advance(*sphere_at({0.2 * kVoxel * f, 0, 0}));
+        const std::set<Id> now(tracker.particles().id.begin(), tracker.particles().id.end());
+        std::size_t kept = 0;
+        for (const Id id : before) kept += now.count(id);
+        if (f > 0) {
+            EXPECT_GE(static_cast<double>(kept), 0.8 * static_cast<double>(before.size())) << f;
+            EXPECT_GE(static_cast<double>(kept), 0.8 * static_cast<double>(now.size())) << f;
+        }
+        before = now;
+    }
+}
+
+TEST(Tracker, GoesThroughEmptyFrames) {
+    Tracker tracker(with_tolerance(0.01));
+    const EmptySurface nothing;
+    const TrackedFrame first = tracker.advance(nothing);
+    EXPECT_TRUE(first.mesh.empty());
+    EXPECT_TRUE(first.mesh.points.empty());
+    EXPECT_EQ(first.particles, 0u);
+    EXPECT_TRUE(first.within_tolerance);
+
+    expect_sound(tracker.advance(*sphere_at({0, 0, 0})), 1, 2, "first");
+    const std::set<Id> before(tracker.particles().id.begin(), tracker.particles().id.end());
+    const TrackedFrame gap = tracker.advance(nothing);
+    EXPECT_TRUE(gap.mesh.empty());
+    EXPECT_EQ(gap.died, before.size());
+    EXPECT_TRUE(tracker.particles().empty());
+    expect_sound(tracker.advance(*sphere_at({0.5, 0, 0})), 1, 2, "again");
+    for (const Id id : tracker.particles().id) EXPECT_GT(id, *before.rbegin());
+}
+
+TEST(Tracker, GivesTheDisplacementAsVelocity) {
+    const Vec3 step(0.02, -0.01, 0.015);
+    for (const bool told : {true, false}) {
+        SCOPED_TRACE(told ? "with a velocity field" : "without a velocity field");
+        Tracker tracker(with_tolerance(0.01));
+        Tracker::Motion motion;
+        if (told) motion = [&](const Vec3& p) { return Vec3(p + step); };
+        for (int f = 0; f < 4; ++f) {
+            const Vec3 centre = f * step;
+            const TrackedFrame frame = tracker.advance(*sphere_at(centre), motion);
+            if (f == 0) {
+                for (const Vec3& v : frame.mesh.velocities) EXPECT_TRUE(v.isZero());
+                continue;
+            }
+            double sum = 0.0;
+            for (std::size_t v = 0; v < frame.mesh.points.size(); ++v) {
+                // Without a velocity field only the motion along the normal is known.
+                const Vec3 n = (frame.mesh.points[v] - centre).normalized();
+                const Vec3 error = frame.mesh.velocities[v] - step;
+                const double e = (told ? error.norm() : std::abs(error.dot(n))) / step.norm();
+                EXPECT_LT(e, told ? 0.05 : 0.3) << "frame " << f;
+                sum += e;
+            }
+            EXPECT_LT(sum / static_cast<double>(frame.mesh.points.size()), told ? 0.01 : 0.05)
+                << "frame " << f;
+        }
+    }
+}
+
+TEST(Tracker, IsNotLedAstrayByAWrongMotion) {
+    // A velocity field in an unknown unit: a hundred times too fast.
+    const Vec3 step(0.02, 0, 0);
+    Tracker tracker(with_tolerance(0.01));
+    for (int f = 0; f < 3; ++f) {
+        const TrackedFrame frame =
+            tracker.advance(*sphere_at(f * step), [&](const Vec3& p) { return Vec3(p + 100.0 * step); });
+        expect_sound(frame, 1, 2, "frame " + std::to_string(f));
+        if (f > 0) {
+            EXPECT_LT(static_cast<double>(frame.lost), 0.05 * static_cast<double>(frame.particles));
+        }
+    }
+}
+
+TEST(Tracker, GivesTheSameMeshesForTheSameSeedAtAnyThreadCount) {
+    for (const Method method : {Method::Tolerance, Method::Paper}) {
+        const auto run = [&](std::size_t threads, std::uint64_t seed) {
+            const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+            TrackerOptions options = with_tolerance(0.01);
+            options.seed = seed;
+            options.method = method;
+            options.fit = method == Method::Tolerance;
+            Tracker tracker(options);
+            std::vector<TriangleMesh> meshes;
+            for (const double d : {0.66, 0.55, 0.66}) meshes.push_back(tracker.advance(*two_drops(d)).mesh);
+            return meshes;
+        };
+        const auto one = run(1, 5), two = run(2, 5), other = run(2, 6);
+        for (std::size_t f = 0; f < one.size(); ++f) {
+            EXPECT_EQ(one[f].points, two[f].points) << f;
+            EXPECT_EQ(one[f].triangles, two[f].triangles) << f;
+            EXPECT_EQ(one[f].ids, two[f].ids) << f;
+            EXPECT_EQ(one[f].velocities, two[f].velocities) << f;
+            EXPECT_NE(one[f].points, other[f].points) << f;
+        }
+    }
+}
+
+TEST(Tracker, FitsWithFewerTrianglesWithinTheSameTolerance) {
+    TrackerOptions options = with_tolerance(0.01);
+    const auto sphere = sphere_at({0.1, 0.2, 0.3});
+    const TrackedFrame plain = Tracker(options).advance(*sphere);
+    options.fit = true;
+    Tracker tracker(options);
+    const TrackedFrame fitted = tracker.advance(*sphere);
+    expect_sound(fitted, 1, 2, "fitted");
+    EXPECT_TRUE(fitted.within_tolerance);
+    EXPECT_LE(mesh_to_surface(fitted.mesh, *sphere), 0.01);
+    EXPECT_LT(fitted.mesh.triangles.size(), plain.mesh.triangles.size());
+    // Particles stay on the surface.
+    const auto probe = sphere->probe();
+    for (const Vec3& p : tracker.particles().position) EXPECT_LT(std::abs(probe->value(p)), 1e-6);
+}
+
+TEST(Tracker, KeepsItsParticlesOnTheSurface) {
+    const LevelSet level_set(rasterise(*shapes::torus({0, 0, 0}, 0.7, 0.25, kVoxel), kVoxel));
+    Tracker tracker(with_tolerance(0.02));
+    tracker.advance(level_set);
+    const auto probe = level_set.probe();
+    const Particles& particles = tracker.particles();
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+        EXPECT_LT(std::abs(probe->value(particles.position[i])), 1e-3 * kVoxel);
+        EXPECT_GT(particles.normal[i].dot(probe->normal(particles.position[i])), 0.999);
+    }
+}
+
+TEST(Tracker, SamplesAsInThePaper) {
+    TrackerOptions options = with_tolerance(0.05);
+    options.method = Method::Paper;
+    for (const Reconstruction reconstruction : {Reconstruction::Guided, Reconstruction::Pure}) {
+        options.reconstruction = reconstruction;
+        Tracker tracker(options);
+        for (int f = 0; f < 2; ++f) {
+            const TrackedFrame frame = tracker.advance(*sphere_at({0.03 * f, 0, 0}));
+            expect_sound(frame, 1, 2, "frame " + std::to_string(f));
+            EXPECT_EQ(mesh_topology(frame.mesh).genus(), 0);
+        }
+        // 20 degrees between neighbours' normals on the unit sphere: a spacing of about 0.35.
+        double sum = 0.0;
+        const Particles& particles = tracker.particles();
+        for (const double h : particles.spacing) sum += h;
+        EXPECT_NEAR(sum / static_cast<double>(particles.size()), 0.35, 0.05);
+    }
+}
+
+TEST(Tracker, KeepsEdgesWithinTheirBounds) {
+    TrackerOptions options = with_tolerance(0.5);  // says nothing on a sphere of radius 1
+    options.max_edge = 0.2;
+    Tracker tracker(options);
+    tracker.advance(*sphere_at({0, 0, 0}));
+    for (const double h : tracker.particles().spacing) EXPECT_LE(h, 0.2);
+    EXPECT_GT(tracker.particles().size(), 4.0 * 3.14 / (0.866 * 0.2 * 0.2) * 0.7);
+}
+
+TEST(Tracker, RefusesOptionsOutOfRange) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (const double tolerance : {0.0, -1.0, nan})
+        EXPECT_THROW(Tracker{with_tolerance(tolerance)}, OptionError);
+    const auto refuses = [](const std::function<void(TrackerOptions&)>& spoil) {
+        TrackerOptions options = with_tolerance(0.01);
+        spoil(options);
+        EXPECT_THROW(Tracker{options}, OptionError);
+    };
+    for (const double angle : {0.0, -5.0, 90.5, nan})
+        refuses([&](TrackerOptions& o) { o.angle_deg = angle; });
+    for (const double edge : {0.0, -0.1, nan}) {
+        refuses([&](TrackerOptions& o) { o.min_edge = edge; });
+        refuses([&](TrackerOptions& o) { o.max_edge = edge; });
+    }
+    refuses([](TrackerOptions& o) {
+        o.min_edge = 0.2;
+        o.max_edge = 0.1;
+    });
+    TrackerOptions most = with_tolerance(0.01);
+    most.angle_deg = 90.0;
+    EXPECT_NO_THROW(Tracker{most});
+}
+
+}  // namespace
+}  // namespace isotrack
