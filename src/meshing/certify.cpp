@@ -37,11 +37,31 @@ double squared_distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3&
     return (ap - (vb / sum) * ab - (vc / sum) * ac).squaredNorm();
 }
 
+/// Follows the error uphill from a lattice point, by ever smaller steps in the triangle's barycentric
+/// coordinates.
+void climb(Surface::Probe& probe, const Vec3& a, const Vec3& ab, const Vec3& ac, double step, double& u,
+           double& v, double& largest) {
+    constexpr int kHalvings = 3;
+    constexpr int kDirections[6][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}};
+    for (int halving = 0; halving < kHalvings; ++halving, step *= 0.5) {
+        const double from_u = u, from_v = v;
+        for (const auto& d : kDirections) {
+            const double next_u = from_u + step * d[0], next_v = from_v + step * d[1];
+            if (next_u < 0.0 || next_v < 0.0 || next_u + next_v > 1.0) continue;
+            const double value = std::abs(probe.value(a + next_u * ab + next_v * ac));
+            if (value <= largest) continue;
+            largest = value;
+            u = next_u;
+            v = next_v;
+        }
+    }
+}
+
 }  // namespace
 
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
-                                           int steps) {
+                                           int steps, double refine_above) {
     std::vector<TriangleError> errors(triangles.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
         const auto probe = surface.probe();
@@ -50,18 +70,21 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                        &c = points[triangles[t][2]];
             TriangleError& error = errors[t];
             int count = 0;
+            double best_u = 0.0, best_v = 0.0;
             for (int i = 0; i <= steps; ++i)
                 for (int j = 0; i + j <= steps; ++j) {
-                    const Vec3 p = a + (b - a) * (static_cast<double>(i) / steps) +
-                                   (c - a) * (static_cast<double>(j) / steps);
-                    const double e = std::abs(probe->value(p));
-                    error.mean_square += e * e;
+                    const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
+                    const double value = std::abs(probe->value(a + u * (b - a) + v * (c - a)));
+                    error.mean_square += value * value;
                     ++count;
-                    if (e > error.largest) {
-                        error.largest = e;
-                        error.where = p;
-                    }
+                    if (value <= error.largest) continue;
+                    error.largest = value;
+                    best_u = u;
+                    best_v = v;
                 }
+            if (error.largest > refine_above)
+                climb(*probe, a, b - a, c - a, 0.5 / steps, best_u, best_v, error.largest);
+            error.where = a + best_u * (b - a) + best_v * (c - a);
             error.mean_square /= count;
         }
     });

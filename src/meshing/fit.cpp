@@ -11,6 +11,11 @@
 namespace isotrack {
 namespace {
 
+// The closed Newton-Cotes rule of degree 3 over a triangle: exact for the parabola that a curved surface
+// makes under a facet.
+constexpr int kLattice = 3;
+constexpr double kWeight[3] = {54.0, 9.0, 4.0};  // in the middle, on an edge, in a corner
+
 constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
 
 /// The triangles around each vertex: those of v are entries first[v] to first[v + 1] - 1, as 3 * triangle +
@@ -31,7 +36,7 @@ struct Corners {
 }  // namespace
 
 void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-         const std::vector<Vec3>& normals, const Surface& surface, int steps, int lattice) {
+         const std::vector<Vec3>& normals, const Surface& surface, int steps) {
     const Corners corners(vertices.size(), triangles);
     std::vector<double> limit(vertices.size(), std::numeric_limits<double>::infinity());
     for (const Triangle& t : triangles)
@@ -52,15 +57,17 @@ void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                            &c = vertices[triangles[t][2]];
                 const double area = (b - a).cross(c - a).norm();
                 shares[t] = {};
-                for (int i = 0; i <= lattice; ++i)
-                    for (int j = 0; i + j <= lattice; ++j) {
-                        const double u = static_cast<double>(i) / lattice,
-                                     v = static_cast<double>(j) / lattice;
+                for (int i = 0; i <= kLattice; ++i)
+                    for (int j = 0; i + j <= kLattice; ++j) {
+                        const double u = static_cast<double>(i) / kLattice,
+                                     v = static_cast<double>(j) / kLattice;
                         const double w[3] = {1.0 - u - v, u, v};
+                        const int zeros = (i == 0) + (j == 0) + (i + j == kLattice);
+                        const double share = area * kWeight[zeros];
                         const double value = probe.value(w[0] * a + w[1] * b + w[2] * c);
                         for (int k = 0; k < 3; ++k) {
-                            shares[t][k].value += area * w[k] * value;
-                            shares[t][k].weight += area * w[k];
+                            shares[t][k].value += share * w[k] * value;
+                            shares[t][k].weight += share * w[k];
                         }
                     }
             }

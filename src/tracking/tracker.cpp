@@ -31,6 +31,8 @@ constexpr int kSweepsPerRound = 3;
 constexpr int kSizingSteps = 3,
               kCertifySteps =
                   6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
+constexpr double kSuspect =
+    0.6;  // of the tolerance: above it a triangle's largest error is searched for between the samples
 constexpr int kCertifyRounds = 12, kRelaxedCertifyRounds = 4;
 constexpr int kFitSteps = 4;
 constexpr double kAngleFloor = 2.0;  // resolutions: sharp edges are as round as the grid makes them
@@ -232,7 +234,7 @@ struct Tracker::Impl {
             const int p = b.carved.particle[v];
             normals.push_back(p >= 0 ? particles.normal[p] : probe->normal(b.vertices[v]));
         }
-        fit(b.vertices, b.carved.triangles, normals, surface, kFitSteps, kSizingSteps);
+        fit(b.vertices, b.carved.triangles, normals, surface, kFitSteps);
         for (Vec3& v : b.vertices) v = v.cast<float>().cast<double>();
     }
 
@@ -295,7 +297,8 @@ struct Tracker::Impl {
     std::size_t refine(const Build& b, const Surface& surface, const SizingLimits& l,
                        const std::vector<Surface::Crossing>& crossings) {
         std::vector<Shortage> shortages;
-        const auto errors = triangle_errors(b.vertices, b.carved.triangles, surface, kCertifySteps);
+        const auto errors =
+            triangle_errors(b.vertices, b.carved.triangles, surface, kCertifySteps, kSuspect * l.tolerance);
         for (std::size_t t = 0; t < errors.size(); ++t) {
             if (errors[t].largest <= l.tolerance) continue;
             double h = l.max_edge;
@@ -320,7 +323,8 @@ struct Tracker::Impl {
     static void measure(const Build& b, const Surface& surface, const SizingLimits& l,
                         const std::vector<Surface::Crossing>& crossings, TrackedFrame& frame) {
         const StageTimer timer(frame.seconds, "certify");
-        const auto errors = triangle_errors(b.vertices, b.carved.triangles, surface, kCertifySteps);
+        const auto errors =
+            triangle_errors(b.vertices, b.carved.triangles, surface, kCertifySteps, kSuspect * l.tolerance);
         double sum = 0.0, weight = 0.0;
         for (std::size_t t = 0; t < errors.size(); ++t) {
             const auto& [i, j, k] = b.carved.triangles[t];

@@ -151,7 +151,10 @@ TEST(Measure, AgreesWithDistancesToEveryTriangle) {
     const TriangleMesh mesh = volume_to_mesh(level_set, 0.6);
     const auto probe = level_set.probe();
     auto crossings = level_set.crossings();
-    for (auto& c : crossings) c.point = probe->project(c.point).value_or(c.point);
+    for (auto& c : crossings) {
+        c.point = probe->project(c.point).value_or(c.point);
+        c.outward.setZero();  // the nearest triangle, whichever way it faces
+    }
     double largest = 0.0, squares = 0.0;
     for (const double d : crossing_distances(mesh.points, mesh.triangles, crossings, 1.0)) {
         largest = std::max(largest, d);

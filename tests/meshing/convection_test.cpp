@@ -370,6 +370,23 @@ TEST(TriangleErrors, AreThoseOfTheSampledPoints) {
     }
 }
 
+TEST(TriangleErrors, FollowTheErrorBetweenThePointsWhenItMatters) {
+    const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.4, 0.1);
+    const TriangleMesh mesh = support::torus(14, 9);
+    const auto coarse = triangle_errors(mesh.points, mesh.triangles, *torus, 6);
+    const auto fine = triangle_errors(mesh.points, mesh.triangles, *torus, 60);
+    const auto found = triangle_errors(mesh.points, mesh.triangles, *torus, 6, 0.0);
+    const auto unmoved = triangle_errors(mesh.points, mesh.triangles, *torus, 6, 1.0);
+    const auto probe = torus->probe();
+    for (std::size_t t = 0; t < fine.size(); ++t) {
+        EXPECT_GE(found[t].largest, coarse[t].largest);
+        EXPECT_NEAR(found[t].largest, fine[t].largest, 0.01 * fine[t].largest);
+        EXPECT_EQ(found[t].mean_square, coarse[t].mean_square);
+        EXPECT_EQ(unmoved[t].largest, coarse[t].largest);
+        EXPECT_NEAR(std::abs(probe->value(found[t].where)), found[t].largest, 1e-12);
+    }
+}
+
 TEST(CrossingDistances, AreExactUpToTheCutoffAndInfiniteBeyond) {
     // A mesh of the left sphere alone: the crossings of the right one are far away.
     const auto surface =
@@ -438,8 +455,7 @@ TEST(Fit, AveragesTheSignedErrorOfASphereOut) {
     const double before = mean_signed_error(mesh);
     const auto errors_before = triangle_errors(mesh.points, mesh.triangles, *sphere, 6);
     ASSERT_LT(before, 0.0);
-    fit(mesh.points, mesh.triangles, normals, *sphere, 6,
-        24);  // fine, so that the lattice's mean is the area's
+    fit(mesh.points, mesh.triangles, normals, *sphere, 6);
     EXPECT_LT(std::abs(mean_signed_error(mesh)), 0.1 * std::abs(before));
     // The root mean square falls too, and each vertex stays on its normal.
     const auto errors = triangle_errors(mesh.points, mesh.triangles, *sphere, 6);
@@ -464,7 +480,7 @@ TEST(Fit, NeverStepsFurtherThanATenthOfTheShortestEdge) {
                 shortest[t[k]] =
                     std::min(shortest[t[k]], (mesh.points[t[(k + end) % 3]] - mesh.points[t[k]]).norm());
     TriangleMesh moved = mesh;
-    fit(moved.points, moved.triangles, normals, *far, 1, 3);
+    fit(moved.points, moved.triangles, normals, *far, 1);
     for (std::size_t v = 0; v < mesh.points.size(); ++v)
         EXPECT_NEAR((moved.points[v] - mesh.points[v]).norm(), 0.1 * shortest[v], 1e-12);
 }
@@ -473,9 +489,9 @@ TEST(Fit, GivesTheSameBitsAtAnyThreadCount) {
     const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
     const TriangleMesh mesh = support::icosphere(3);
     auto many = mesh.points, one = mesh.points;
-    fit(many, mesh.triangles, mesh.points, *sphere, 3, 3);
+    fit(many, mesh.triangles, mesh.points, *sphere, 3);
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
-    fit(one, mesh.triangles, mesh.points, *sphere, 3, 3);
+    fit(one, mesh.triangles, mesh.points, *sphere, 3);
     EXPECT_EQ(many, one);
 }
 

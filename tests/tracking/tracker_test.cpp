@@ -331,6 +331,9 @@ TEST(Tracker, FitsWithFewerTrianglesWithinTheSameTolerance) {
     EXPECT_TRUE(fitted.within_tolerance);
     EXPECT_LE(mesh_to_surface(fitted.mesh, *sphere), 0.01);
     EXPECT_LT(fitted.mesh.triangles.size(), plain.mesh.triangles.size());
+    const double truth = 4.0 / 3.0 * 3.141592653589793;
+    EXPECT_LT(std::abs(enclosed_volume(fitted.mesh) - truth),
+              0.1 * std::abs(enclosed_volume(plain.mesh) - truth));
     // Particles stay on the surface.
     const auto probe = sphere->probe();
     for (const Vec3& p : tracker.particles().position) EXPECT_LT(std::abs(probe->value(p)), 1e-6);
@@ -365,6 +368,61 @@ TEST(Tracker, SamplesAsInThePaper) {
         for (const double h : particles.spacing) sum += h;
         EXPECT_NEAR(sum / static_cast<double>(particles.size()), 0.35, 0.05);
     }
+}
+
+TEST(Tracker, GivesEveryShapeItsTopology) {
+    const auto near = shapes::unite(
+        {shapes::sphere(Vec3(-0.44, 0, 0), 0.4, 0.04), shapes::sphere(Vec3(0.44, 0, 0), 0.4, 0.04)});
+    const struct {
+        shapes::SurfacePtr shape;
+        std::size_t components;
+        long euler;
+    } cases[] = {{shapes::torus(Vec3::Zero(), 0.7, 0.25, 0.04), 1, 0},
+                 {shapes::shell(Vec3::Zero(), 0.8, 0.12, 0.04), 2, 4},
+                 {shapes::plate(Vec3::Zero(), 0.7, 0.09, 0.04), 1, 2},
+                 {shapes::box(Vec3::Zero(), Vec3(0.5, 0.4, 0.3), 0.04), 1, 2},
+                 {near, 2, 4}};
+    for (const auto& c : cases) {
+        SCOPED_TRACE(&c - cases);
+        const TrackedFrame result = Tracker(with_tolerance(0.02)).advance(*c.shape);
+        expect_sound(result, c.components, c.euler, "");
+        EXPECT_LE(mesh_to_surface(result.mesh, *c.shape), 0.02);
+    }
+}
+
+TEST(Tracker, FollowsBallsThatCutIntoEachOther) {
+    Tracker tracker(with_tolerance(0.02));
+    const auto pair = [](double gap) {
+        return shapes::unite({shapes::sphere(Vec3(-0.4 - gap, 0, 0), 0.4, 0.04),
+                              shapes::sphere(Vec3(0.4 + gap, 0, 0), 0.4, 0.04)});
+    };
+    expect_sound(tracker.advance(*pair(0.1)), 2, 4, "");
+    expect_sound(tracker.advance(*pair(-0.1)), 1, 2, "");
+    expect_sound(tracker.advance(*pair(0.1)), 2, 4, "");
+    const auto with_drop = shapes::unite({pair(0.1), shapes::sphere(Vec3(0, 1, 0), 0.1, 0.04)});
+    const TrackedFrame born = tracker.advance(*with_drop);
+    expect_sound(born, 3, 6, "");
+    EXPECT_GT(born.seeded, 0u);
+    expect_sound(tracker.advance(*pair(0.1)), 2, 4, "");
+}
+
+TEST(Tracker, SamplesMoreDenselyWhereItIsCurvedAsInThePaper) {
+    TrackerOptions o = with_tolerance(0.02);
+    o.method = Method::Paper;
+    Tracker tracker(o);
+    // An ellipsoid: the density must follow the curvature.
+    const auto ellipsoid = shapes::ellipsoid(Vec3::Zero(), Vec3(1.0, 0.4, 0.4), 0.04);
+    expect_sound(tracker.advance(*ellipsoid), 1, 2, "");
+    double tip = 0.0, waist = 0.0;
+    int tips = 0, waists = 0;
+    for (std::size_t i = 0; i < tracker.particles().size(); ++i) {
+        const double x = std::abs(tracker.particles().position[i].x());
+        if (x > 0.9) tip += tracker.particles().spacing[i], ++tips;
+        if (x < 0.2) waist += tracker.particles().spacing[i], ++waists;
+    }
+    ASSERT_GT(tips, 0);
+    ASSERT_GT(waists, 0);
+    EXPECT_LT(tip / tips, 0.8 * waist / waists);
 }
 
 TEST(Tracker, KeepsEdgesWithinTheirBounds) {

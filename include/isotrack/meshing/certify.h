@@ -1,6 +1,7 @@
 // Holding a mesh against the surface, both ways.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "isotrack/surface/surface.h"
@@ -17,9 +18,12 @@ struct TriangleError {
 
 /// Errors of each triangle at the points of a regular barycentric lattice with `steps` intervals per edge (>=
 /// 1): (steps+1)(steps+2)/2 points. Uses TBB inside; the result does not depend on the number of threads.
+/// Where the largest of them is above `refine_above` the error is followed uphill between the points; the
+/// mean is that of the points.
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
-                                           int steps);
+                                           int steps,
+                                           double refine_above = std::numeric_limits<double>::infinity());
 
 /// Distance of every lattice crossing of the surface to the nearest triangle that faces its way (so that one
 /// side of a thin sheet does not stand for the other), in the order of `crossings`, world units. Exact up to
