@@ -51,7 +51,9 @@ struct AffineMap {
         if (!(volume > 0.0) || !std::isfinite(volume))
             throw InputError(grid_label(grid) + " has a transform that cannot be inverted");
         inverse = linear.inverse();
-        voxel_size = std::cbrt(volume);
+        const Vec3 edges = linear.colwise().norm();
+        const bool uniform = edges.maxCoeff() - edges.minCoeff() <= 1e-9 * edges.maxCoeff();
+        voxel_size = uniform ? edges[0] : std::cbrt(volume);
     }
     Vec3 to_world(const Vec3& index) const { return linear * index + shift; }
     Vec3 to_index(const Vec3& world) const { return inverse * (world - shift); }

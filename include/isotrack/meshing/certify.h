@@ -25,9 +25,10 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            int steps,
                                            double refine_above = std::numeric_limits<double>::infinity());
 
-/// Distance of every lattice crossing of the surface to the nearest triangle that faces its way (so that one
-/// side of a thin sheet does not stand for the other), in the order of `crossings`, world units. Exact up to
-/// `cutoff`; beyond it the entry is infinite.
+/// Distance of every lattice crossing of the surface to the nearest triangle that faces its way (unit normal
+/// . outward >= -0.2, since a crossed edge may lie nearly in the surface), so that one side of a thin sheet
+/// does not stand for the other. In the order of `crossings`, world units. Exact up to `cutoff`; beyond it
+/// the entry is infinite.
 std::vector<double> crossing_distances(const std::vector<Vec3>& points,
                                        const std::vector<Triangle>& triangles,
                                        const std::vector<Surface::Crossing>& crossings, double cutoff);
