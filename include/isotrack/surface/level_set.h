@@ -22,9 +22,9 @@ struct LevelSetOptions {
 /// continuous, second order. Any linear transform is understood; gradients and distances are of the world.
 /// Values that are distances in voxels (measured at the surface) are turned into world units. Inside and
 /// outside are known everywhere: inactive voxels and tiles carry a sign, a background of zero means outside,
-/// values that are not finite mean outside, and a surface that runs into the border of its voxels is closed
-/// there by a flat cap one voxel beyond the last of them, where volumeToMesh would put it. Immutable after
-/// construction; const members may be called from any number of threads.
+/// NaN and infinity mean outside, minus infinity inside, and a surface that runs into the border of its
+/// voxels is closed there by a flat cap one voxel beyond the last of them, where volumeToMesh would put it.
+/// Immutable after construction; const members may be called from any number of threads.
 class LevelSet : public Surface {
 public:
     /// \throws InputError if the grid is neither float nor double, if its transform is not linear, or if it
