@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <random>
 #include <set>
 
@@ -48,6 +51,79 @@ TEST(Tetrahedralise, LeavesEveryCircumsphereEmpty) {
         for (const Vec3& p : points) EXPECT_GE((p - o).norm(), radius * (1.0 - 1e-9));
     }
     EXPECT_GT(finite, points.size());
+}
+
+/// Points with whole coordinates from 0 to `largest`, so that determinants can be had without rounding.
+std::vector<Vec3> whole_points(std::size_t n, int largest, unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_int_distribution<int> u(0, largest);
+    std::set<std::array<int, 3>> seen;
+    std::vector<Vec3> points;
+    while (points.size() < n) {
+        const std::array<int, 3> p{u(random), u(random), u(random)};
+        if (seen.insert(p).second) points.emplace_back(p[0], p[1], p[2]);
+    }
+    return points;
+}
+
+using Whole = Eigen::Matrix<std::int64_t, 3, 1>;
+
+Whole to_whole(const Vec3& p) {
+    return p.cast<std::int64_t>();
+}
+
+/// Positive when v is inside the circumsphere of the positively oriented pqrs. Exact for coordinates up to
+/// 1000.
+std::int64_t in_sphere(const Vec3& p, const Vec3& q, const Vec3& r, const Vec3& s, const Vec3& v) {
+    const Whole w = to_whole(v), a = to_whole(p) - w, b = to_whole(q) - w, c = to_whole(r) - w,
+                d = to_whole(s) - w;
+    return a.squaredNorm() * b.dot(c.cross(d)) - b.squaredNorm() * a.dot(c.cross(d)) +
+           c.squaredNorm() * a.dot(b.cross(d)) - d.squaredNorm() * a.dot(b.cross(c));
+}
+
+TEST(Tetrahedralise, IsDelaunayToTheLastBit) {
+    std::vector<Vec3> lattice;  // eight points on every cell's sphere
+    for (int i = 0; i < 5 * 5 * 5; ++i) lattice.emplace_back(i / 25, i / 5 % 5, i % 5);
+    for (const auto& points : {whole_points(250, 1000, 1), whole_points(120, 6, 2), lattice}) {
+        // The sign convention, on a tetrahedron and its middle.
+        ASSERT_GT(in_sphere({0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {0, 0, 4}, {1, 1, 1}), 0);
+        const Tetrahedra cells = tetrahedralise(points);
+        double volume6 = 0.0;
+        std::set<int> used;
+        for (std::size_t c = 0; c < cells.size(); ++c) {
+            const auto& v = cells.vertices[c];
+            if (cells.is_infinite(static_cast<int>(c))) continue;
+            const Vec3 &p = points[v[0]], &q = points[v[1]], &r = points[v[2]], &s = points[v[3]];
+            ASSERT_EQ(orientation(p, q, r, s), 1);
+            volume6 += (q - p).cross(r - p).dot(s - p);
+            used.insert(v.begin(), v.end());
+            for (const Vec3& other : points) ASSERT_LE(in_sphere(p, q, r, s, other), 0);
+        }
+        EXPECT_EQ(used.size(), points.size());
+        // Nothing twice and no gap: the cells fill the lattice's cube.
+        if (points.size() == lattice.size()) {
+            EXPECT_EQ(volume6, 6.0 * 64.0);
+        }
+    }
+}
+
+TEST(Tetrahedralise, GivesTheSameCellsInTheSameOrder) {
+    const auto points = random_points(300, 9);
+    const Tetrahedra a = tetrahedralise(points), b = tetrahedralise(points);
+    EXPECT_EQ(a.vertices, b.vertices);
+    EXPECT_EQ(a.neighbours, b.neighbours);
+}
+
+TEST(Tetrahedralise, ClosesTheHullByOneInfiniteVertex) {
+    const auto points = random_points(100, 10);
+    const Tetrahedra cells = tetrahedralise(points);
+    for (std::size_t c = 0; c < cells.size(); ++c)
+        EXPECT_LE(std::count(cells.vertices[c].begin(), cells.vertices[c].end(), Tetrahedra::kInfinite), 1);
+    const Tetrahedra one = tetrahedralise({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
+    EXPECT_EQ(one.size(), 5u);
+    std::size_t infinite = 0;
+    for (int c = 0; c < 5; ++c) infinite += one.is_infinite(c);
+    EXPECT_EQ(infinite, 4u);
 }
 
 TEST(Tetrahedralise, OrientsCellsAndFacetsAndLinksNeighboursBothWays) {
@@ -125,6 +201,133 @@ TEST(Tetrahedralisation, IsThatOfTheMovedPointsOnceSettled) {
     }
     dt->settle();
     for (const auto& cell : dt->cells().vertices) EXPECT_EQ(std::count(cell.begin(), cell.end(), 42), 0);
+}
+
+/// The cells as sets of points, so that it does not matter how vertices are numbered.
+std::set<std::vector<std::array<double, 3>>> cell_places(const Tetrahedra& cells,
+                                                         const std::vector<Vec3>& points) {
+    std::set<std::vector<std::array<double, 3>>> result;
+    for (const auto& cell : cells.vertices) {
+        std::vector<std::array<double, 3>> places;
+        for (const int v : cell)
+            if (v >= 0) places.push_back({points[v].x(), points[v].y(), points[v].z()});
+        std::sort(places.begin(), places.end());
+        result.insert(places);
+    }
+    return result;
+}
+
+TEST(Tetrahedralisation, EqualsAFreshBuildAfterAnyHistory) {
+    std::mt19937 random(12);
+    std::uniform_real_distribution<double> u(-1.0, 1.0);
+    const auto anywhere = [&] { return Vec3(u(random), u(random), u(random)); };
+    const auto dt = make_tetrahedralisation(UpdateStrategy::Rebuild);
+    std::vector<Vec3> points = random_points(30, 13);
+    std::vector<char> alive(points.size(), 1);
+    dt->assign(points);
+    for (int round = 0; round < 25; ++round) {
+        for (int change = 0; change < 12; ++change) {
+            const int v = static_cast<int>(random() % points.size());
+            switch (random() % 3) {
+                case 0:
+                    points.push_back(anywhere());
+                    alive.push_back(1);
+                    ASSERT_EQ(dt->insert(points.back(), alive[v] ? v : -1),
+                              static_cast<int>(points.size()) - 1);
+                    break;
+                case 1:
+                    if (!alive[v]) break;
+                    points[v] += 0.1 * anywhere();
+                    dt->move(v, points[v]);
+                    break;
+                default:
+                    if (!alive[v]) break;
+                    alive[v] = 0;
+                    dt->remove(v);
+            }
+        }
+        dt->settle();
+        std::vector<Vec3> left;
+        for (std::size_t i = 0; i < points.size(); ++i)
+            if (alive[i]) left.push_back(points[i]);
+        ASSERT_EQ(cell_places(dt->cells(), points), cell_places(tetrahedralise(left), left))
+            << "round " << round;
+        // Neighbours are those of the cells.
+        const Adjacency adjacency = vertex_adjacency(dt->cells(), points.size());
+        std::vector<int> neighbours;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            if (!alive[i]) continue;
+            dt->neighbours(static_cast<int>(i), neighbours);
+            std::sort(neighbours.begin(), neighbours.end());
+            ASSERT_EQ(neighbours, std::vector<int>(adjacency.of(i).begin(), adjacency.of(i).end()));
+        }
+    }
+}
+
+TEST(Tetrahedralisation, MayRunOutOfPointsAndStartAgain) {
+    const auto dt = make_tetrahedralisation(UpdateStrategy::Rebuild);
+    dt->assign({});
+    EXPECT_EQ(dt->cells().size(), 0u);
+    dt->assign(random_points(6, 14));
+    EXPECT_GT(dt->cells().size(), 0u);
+    for (int v = 0; v < 4; ++v) dt->remove(v);
+    dt->settle();
+    EXPECT_EQ(dt->cells().size(), 0u);
+    std::vector<int> neighbours{1, 2, 3};
+    dt->neighbours(5, neighbours);
+    EXPECT_TRUE(neighbours.empty());
+    for (const Vec3& p : random_points(4, 15)) dt->insert(p, -1);
+    dt->settle();
+    EXPECT_GT(dt->cells().size(), 0u);
+    dt->assign(random_points(10, 16));  // numbers start anew
+    EXPECT_EQ(dt->insert(Vec3::Zero(), -1), 10);
+}
+
+TEST(Tetrahedralisation, LeavesAVertexOnTheVeryPlaceOfAnotherOut) {
+    auto points = random_points(20, 17);
+    points.push_back(points[3]);
+    const auto dt = make_tetrahedralisation(UpdateStrategy::Rebuild);
+    dt->assign(points);
+    const Adjacency adjacency = vertex_adjacency(dt->cells(), points.size());
+    EXPECT_EQ(adjacency.of(3).size() == 0u, adjacency.of(20).size() != 0u);  // one of the two
+    dt->move(20, {0.01, 0.02, 0.03});
+    dt->settle();
+    EXPECT_GT(vertex_adjacency(dt->cells(), points.size()).of(20).size(), 0u);
+}
+
+TEST(Predicates, TellTheDiametralBallByExactArithmetic) {
+    // In whole numbers: with n = (q - p) x (r - p), the centre of the circle is p + C / (2 |n|^2), and v is
+    // inside when |w|^2 |n|^2 < w . C for w = v - p.
+    int inside = 0, on = 0;
+    for (unsigned seed = 0; seed < 3000; ++seed) {
+        const auto points = whole_points(4, 6, seed);
+        const Whole p = to_whole(points[0]), a = to_whole(points[1]) - p, b = to_whole(points[2]) - p,
+                    w = to_whole(points[3]) - p, n = a.cross(b);
+        if (n.squaredNorm() == 0) continue;
+        const Whole c = a.squaredNorm() * b.cross(n) + b.squaredNorm() * n.cross(a);
+        const std::int64_t gap = w.dot(c) - w.squaredNorm() * n.squaredNorm();
+        ASSERT_EQ(in_diametral_ball(points[0], points[1], points[2], points[3]), gap > 0);
+        inside += gap > 0;
+        on += gap == 0;
+    }
+    EXPECT_GT(inside, 100);
+    EXPECT_GT(on, 10);
+}
+
+TEST(Predicates, KeepTheirSignUnderPermutations) {
+    for (unsigned seed = 0; seed < 200; ++seed) {
+        auto points = whole_points(4, 3, seed);
+        points[3].z() = std::nextafter(points[3].z(), 10.0);
+        const Vec3 &p = points[0], &q = points[1], &r = points[2], &s = points[3];
+        const int sign = orientation(p, q, r, s);
+        EXPECT_EQ(orientation(q, r, p, s), sign);
+        EXPECT_EQ(orientation(q, p, r, s), -sign);
+        EXPECT_EQ(orientation(p, q, s, r), -sign);
+        EXPECT_EQ(orientation(s, r, q, p), sign);
+        if (orientation(p, q, r, Vec3(1, 1, 1)) != 0 || sign != 0) {
+            EXPECT_EQ(in_diametral_ball(p, q, r, s), in_diametral_ball(r, q, p, s));
+        }
+    }
 }
 
 TEST(Predicates, AreExactOnTheBoundary) {
