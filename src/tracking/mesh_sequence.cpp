@@ -81,6 +81,31 @@ Tracker::Motion motion_along(const openvdb::Vec3SGrid::ConstPtr& velocity, doubl
         [at, frame_time](const Vec3& p) { return Vec3(p + frame_time * at(p + 0.5 * frame_time * at(p))); };
 }
 
+TrackerOptions tracker_options(const MeshSequenceOptions& options, double voxel_size) {
+    TrackerOptions result;
+    result.tolerance = options.tolerance.in_world(voxel_size);
+    result.angle_deg = options.angle_deg;
+    if (options.min_edge) result.min_edge = options.min_edge->in_world(voxel_size);
+    if (options.max_edge) result.max_edge = options.max_edge->in_world(voxel_size);
+    result.method = options.method;
+    result.reconstruction = options.reconstruction;
+    result.fit = options.fit;
+    result.seed = options.seed;
+    return result;
+}
+
+/// What can be said before the first frame: lengths in voxels and in world units cannot be compared yet.
+void check_options(MeshSequenceOptions options) {
+    if (options.fps && !(*options.fps > 0.0)) throw OptionError("the frame rate must be positive");
+    if (options.min_edge && options.max_edge && options.min_edge->in_voxels != options.max_edge->in_voxels) {
+        MeshSequenceOptions without_smallest = options;
+        without_smallest.min_edge.reset();
+        check_options(without_smallest);
+        options.max_edge.reset();
+    }
+    const Tracker check(tracker_options(options, 1.0));
+}
+
 void check_outputs(const InputSequence& input, const std::string& output,
                    const MeshSequenceOptions& options) {
     if (input.frames.empty()) throw OptionError("no input frames");
@@ -101,25 +126,11 @@ void check_outputs(const InputSequence& input, const std::string& output,
                 throw OptionError("'" + path +
                                   "' exists; choose another output, --overwrite or --skip-existing");
         }
-    if (options.fps && !(*options.fps > 0.0)) throw OptionError("the frame rate must be positive");
     const fs::path folder = fs::path(expand_pattern(output, input.frames.front().number)).parent_path();
     if (folder.empty()) return;
     std::error_code failure;
     fs::create_directories(folder, failure);
     if (failure) throw OptionError("cannot make the folder '" + folder.string() + "': " + failure.message());
-}
-
-TrackerOptions tracker_options(const MeshSequenceOptions& options, double voxel_size) {
-    TrackerOptions result;
-    result.tolerance = options.tolerance.in_world(voxel_size);
-    result.angle_deg = options.angle_deg;
-    if (options.min_edge) result.min_edge = options.min_edge->in_world(voxel_size);
-    if (options.max_edge) result.max_edge = options.max_edge->in_world(voxel_size);
-    result.method = options.method;
-    result.reconstruction = options.reconstruction;
-    result.fit = options.fit;
-    result.seed = options.seed;
-    return result;
 }
 
 std::map<std::string, std::string> effective_settings(const MeshSequenceOptions& options, double voxel_size) {
@@ -212,8 +223,8 @@ std::string to_string(const Length& length) {
 
 RunReport mesh_sequence(const InputSequence& input, const std::string& output,
                         const MeshSequenceOptions& options, const MeshSequenceEvents& events) {
+    check_options(options);
     check_outputs(input, output, options);
-    tracker_options(options, 1.0);
     RunReport report;
     report.version = ISOTRACK_VERSION;
     std::optional<Tracker> tracker;
@@ -284,7 +295,7 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
             finish(std::move(row));
             continue;
         }
-        if (!tracker) {
+        if (!tracker && !read.level_set->empty()) {
             const TrackerOptions resolved = tracker_options(options, read.level_set->voxel_size());
             tolerance = resolved.tolerance;
             tracker.emplace(resolved);
@@ -297,7 +308,7 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
             motion = motion_along(velocity, frames_passed / options.fps.value_or(1.0));
         TrackedFrame tracked;
         try {
-            tracked = tracker->advance(*read.level_set, motion);
+            if (tracker) tracked = tracker->advance(*read.level_set, motion);
         } catch (const std::exception& error) {
             finish_pending();
             row.status = "failed";

@@ -277,6 +277,22 @@ struct Tracker::Impl {
         update_spacing(particles, b.adjacency, evidence, l);
     }
 
+    /// The newborn move like the neighbours that were there before; alone among newborn they rest.
+    void inherit_velocities(const Adjacency& adjacency, Id first_new) {
+        for (std::size_t i = 0; i < particles.size(); ++i) {
+            if (particles.id[i] < first_new) continue;
+            Vec3 sum = Vec3::Zero();
+            int count = 0;
+            for (const int j : adjacency.of(i)) {
+                if (particles.id[j] >= first_new || !(particles.normal[i].dot(particles.normal[j]) > 0.0))
+                    continue;
+                sum += particles.velocity[j];
+                ++count;
+            }
+            if (count > 0) particles.velocity[i] = sum / count;
+        }
+    }
+
     /// New particles where the mesh fails. Returns how many; 0 when it passes.
     std::size_t refine(const Build& b, const Surface& surface, const SizingLimits& l,
                        const std::vector<Surface::Crossing>& crossings) {
@@ -420,6 +436,7 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
     }
 
     measure(b, surface, l, crossings, frame);
+    inherit_velocities(b.adjacency, first_new);
 
     frame.mesh.points = b.vertices;
     frame.mesh.triangles = b.carved.triangles;

@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <random>
 #include <set>
+#include <string>
 
 #include "isotrack/meshing/certify.h"
 #include "isotrack/meshing/fit.h"
@@ -161,6 +164,23 @@ TEST(PureConvection, FindsTheSurfaceFromTheParticlesAlone) {
     EXPECT_EQ(mesh_topology(mesh).euler, 0);
 }
 
+TEST(PureConvection, IsNoNearerToASphereThanGuidedConvection) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.05);
+    for (const std::uint64_t seed : {1u, 2u, 3u}) {
+        const Samples s(*sphere, 0.15, seed);
+        const auto& points = s.particles.position;
+        const auto largest_error = [&](const CellLabels& labels) {
+            const auto mesh = mesh_of(carve(s.cells, labels, points), points);
+            double largest = 0.0;
+            for (const auto& e : triangle_errors(mesh.points, mesh.triangles, *sphere, 6))
+                largest = std::max(largest, e.largest);
+            return largest;
+        };
+        EXPECT_LE(largest_error(guided_convection(s.cells, points, s.particles.normal, *sphere)),
+                  largest_error(pure_convection(s.cells, points)));
+    }
+}
+
 TEST(PureConvection, LeavesVoidsFilled) {
     const auto surface = shapes::shell({0, 0, 0}, 1.0, 0.3, 0.05);
     const Samples s(*surface, 0.12);
@@ -171,6 +191,42 @@ TEST(PureConvection, LeavesVoidsFilled) {
     const auto inner = std::count_if(s.particles.position.begin(), s.particles.position.end(),
                                      [](const Vec3& p) { return p.norm() < 0.85; });
     EXPECT_EQ(static_cast<std::ptrdiff_t>(carved.unused.size()), inner);
+}
+
+/// What carve says of complex edges, pinched and unused particles, counted on the cells themselves. Empty
+/// when right.
+std::string wrong_count(const Tetrahedra& cells, const CellLabels& labels, const CarvedSurface& carved) {
+    std::map<std::pair<int, int>, int> facets_at_edge;
+    std::set<int> in_dt, on_boundary;
+    for (std::size_t c = 0; c < cells.size(); ++c)
+        for (int k = 0; k < 4; ++k) {
+            if (cells.vertices[c][k] >= 0) in_dt.insert(cells.vertices[c][k]);
+            if (!labels[c] || labels[cells.neighbours[c][k]]) continue;
+            int v[3];
+            for (int i = 0; i < 3; ++i) v[i] = cells.vertices[c][Tetrahedra::kFacet[k][i]];
+            for (int i = 0; i < 3; ++i) {
+                on_boundary.insert(v[i]);
+                ++facets_at_edge[std::minmax(v[i], v[(i + 1) % 3])];
+            }
+        }
+    std::set<std::pair<int, int>> complex, said;
+    for (const auto& [edge, count] : facets_at_edge)
+        if (count > 2) complex.insert(edge);
+    for (std::size_t e = 0; e + 1 < carved.complex_edge_ends.size(); e += 2)
+        said.insert(std::minmax(carved.complex_edge_ends[e], carved.complex_edge_ends[e + 1]));
+    if (said != complex || carved.complex_edges != complex.size()) return "complex edges";
+    std::vector<int> unused;
+    std::set_difference(in_dt.begin(), in_dt.end(), on_boundary.begin(), on_boundary.end(),
+                        std::back_inserter(unused));
+    if (carved.unused != unused) return "unused particles";
+    std::map<int, int> copies;
+    for (const int p : carved.particle)
+        if (p >= 0) ++copies[p];
+    std::vector<int> pinched;
+    for (const auto& [p, count] : copies)
+        if (count > 1) pinched.push_back(p);
+    if (carved.pinched != pinched) return "pinched particles";
+    return "";
 }
 
 // The promise of carve holds for any labels whatever.
@@ -194,6 +250,7 @@ TEST(Carve, IsClosedOrientedAndManifoldForRandomLabels) {
         ASSERT_TRUE(t.closed() && t.oriented() && t.manifold()) << "round " << round;
         ASSERT_EQ(t.unused_vertices, 0u) << "round " << round;
         ASSERT_NEAR(enclosed_volume(mesh), volume, 1e-9 * (1.0 + volume)) << "round " << round;
+        ASSERT_EQ(wrong_count(cells, labels, carved), "") << "round " << round;
         complex += carved.complex_edges;
         pinched += carved.pinched.size();
         split += carved.midpoints.size();
@@ -310,6 +367,23 @@ TEST(TriangleErrors, AreThoseOfTheSampledPoints) {
             EXPECT_NEAR(errors[t].mean_square, sum / count, 1e-12);
             EXPECT_NEAR(std::abs(errors[t].where.norm() - 1.0), largest, 1e-12);
         }
+    }
+}
+
+TEST(TriangleErrors, FollowTheErrorBetweenThePointsWhenItMatters) {
+    const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.4, 0.1);
+    const TriangleMesh mesh = support::torus(14, 9);
+    const auto coarse = triangle_errors(mesh.points, mesh.triangles, *torus, 6);
+    const auto fine = triangle_errors(mesh.points, mesh.triangles, *torus, 60);
+    const auto found = triangle_errors(mesh.points, mesh.triangles, *torus, 6, 0.0);
+    const auto unmoved = triangle_errors(mesh.points, mesh.triangles, *torus, 6, 1.0);
+    const auto probe = torus->probe();
+    for (std::size_t t = 0; t < fine.size(); ++t) {
+        EXPECT_GE(found[t].largest, coarse[t].largest);
+        EXPECT_NEAR(found[t].largest, fine[t].largest, 0.01 * fine[t].largest);
+        EXPECT_EQ(found[t].mean_square, coarse[t].mean_square);
+        EXPECT_EQ(unmoved[t].largest, coarse[t].largest);
+        EXPECT_NEAR(std::abs(probe->value(found[t].where)), found[t].largest, 1e-12);
     }
 }
 

@@ -1,150 +1,457 @@
+// From files to files: what is written, what is said of it, and what happens to frames that are no good.
 #include "isotrack/tracking/mesh_sequence.h"
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
+#include <openvdb/io/File.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "isotrack/error.h"
 #include "isotrack/io/mesh_file.h"
 #include "isotrack/io/sample_sequence.h"
 #include "isotrack/meshing/mesh_topology.h"
+#include "isotrack/surface/rasterise.h"
+#include "isotrack/surface/shapes.h"
+#include "support/temp_folder.h"
 
 namespace isotrack {
 namespace {
 
 namespace fs = std::filesystem;
+using support::TempFolder;
+constexpr double kVoxel = 0.04;
 
-/// Four frames of a moving sphere in a folder of the test's own.
-class MeshSequence : public testing::Test {
-protected:
-    void SetUp() override {
-        const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-        folder_ = fs::temp_directory_path() / (std::string("isotrack_mesh_sequence_") + info->name());
-        fs::remove_all(folder_);
-        fs::create_directories(folder_);
-        SampleSequenceOptions options;
-        options.frames = 4;
-        options.voxel = 0.1;
-        SampleSequence sphere("sphere", options);
-        for (int frame = 1; frame <= sphere.size(); ++frame) write(frame, sphere.next().surface);
-    }
-    void TearDown() override { fs::remove_all(folder_); }
+void write_grids(const std::string& path, const openvdb::GridBase::Ptr& first,
+                 const openvdb::GridBase::Ptr& second = nullptr) {
+    openvdb::GridPtrVec grids;
+    grids.push_back(first);
+    if (second) grids.push_back(second);
+    openvdb::io::File file(path);
+    file.write(grids);
+    file.close();
+}
 
-    void write(int frame, const openvdb::GridBase::Ptr& grid) const {
-        openvdb::GridPtrVec grids;
-        grids.push_back(grid);
-        openvdb::io::File(expand_pattern(in("s.####.vdb"), frame)).write(grids);
-    }
-    std::string in(const std::string& name) const { return (folder_ / name).string(); }
-    InputSequence frames() const { return find_frames({in("s.####.vdb")}); }
-    RunReport run(const MeshSequenceOptions& options = {}) const {
-        return mesh_sequence(frames(), in("m.####.ply"), options);
-    }
+openvdb::FloatGrid::Ptr surface_grid(const Surface& surface, double voxel = kVoxel) {
+    const auto grid = rasterise(surface, voxel);
+    grid->setName("surface");
+    return grid;
+}
 
-    fs::path folder_;
+openvdb::FloatGrid::Ptr empty_grid(double voxel) {
+    const auto grid = openvdb::FloatGrid::create(static_cast<float>(3.0 * voxel));
+    grid->setName("surface");
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
+    return grid;
+}
+
+/// A temporary folder with frames 1 to n of a sphere of radius 0.3 that moves by `step` from one to the next.
+struct MovingSphere {
+    static inline const Vec3 step{0.5 * kVoxel, 0, 0};
+    TempFolder folder;
+
+    explicit MovingSphere(int frames, bool with_velocity = false) {
+        for (int f = 1; f <= frames; ++f) {
+            openvdb::Vec3SGrid::Ptr velocity;
+            if (with_velocity) {
+                const openvdb::Vec3s v(static_cast<float>(step.x()), 0.0f, 0.0f);
+                velocity = openvdb::Vec3SGrid::create(v);  // the same everywhere
+                velocity->setName("velocity");
+                velocity->setTransform(openvdb::math::Transform::createLinearTransform(kVoxel));
+                velocity->tree().setValue(openvdb::Coord(0), v);
+            }
+            write_grids(in(f), surface_grid(*shapes::sphere(centre(f), 0.3, kVoxel)), velocity);
+        }
+    }
+    static Vec3 centre(int f) { return {0.5 + f * step.x(), 0.5, 0.5}; }
+    std::string in(int f) const { return folder.file("in." + std::to_string(f) + ".vdb"); }
+    std::string out(int f) const { return folder.file("out." + std::to_string(f) + ".ply"); }
+    std::string pattern() const { return folder.file("out.#.ply"); }
+    InputSequence input() const { return find_frames({folder.file("in.#.vdb")}); }
+    std::vector<int> written(int frames) const {
+        std::vector<int> result;
+        for (int f = 1; f <= frames; ++f)
+            if (fs::exists(out(f))) result.push_back(f);
+        return result;
+    }
 };
 
-TEST_F(MeshSequence, WritesOneSoundMeshPerFrameAndARowForEach) {
-    const RunReport report = run();
-    ASSERT_EQ(report.frames.size(), 4u);
-    EXPECT_EQ(exit_code(report), 0);
-    for (int frame = 1; frame <= 4; ++frame) {
-        const FrameReport& row = report.frames[frame - 1];
-        const TriangleMesh mesh = read_mesh(expand_pattern(in("m.####.ply"), frame));
-        const MeshTopology topology = mesh_topology(mesh);
-        EXPECT_EQ(row.frame, frame);
-        EXPECT_EQ(row.status, "ok");
-        EXPECT_EQ(mesh.triangles.size(), row.triangles);
-        EXPECT_EQ(mesh.ids.size(), mesh.points.size());
-        EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
-        EXPECT_EQ(topology.euler, 2);
-        EXPECT_LE(row.max_error_vx, 0.5);
+std::vector<std::string> status_of(const RunReport& report) {
+    std::vector<std::string> result;
+    for (const FrameReport& row : report.frames) result.push_back(row.status);
+    return result;
+}
+
+using Words = std::vector<std::string>;
+using Numbers = std::vector<int>;
+
+TEST(ParseLength, TakesVoxelsAndWorldUnits) {
+    const Length voxels = parse_length("0.5vx"), world = parse_length("0.01"), small = parse_length("2.5e-3");
+    EXPECT_TRUE(voxels.in_voxels);
+    EXPECT_EQ(voxels.value, 0.5);
+    EXPECT_EQ(voxels.in_world(0.02), 0.01);
+    EXPECT_FALSE(world.in_voxels);
+    EXPECT_EQ(world.in_world(123.0), 0.01);
+    EXPECT_EQ(small.value, 2.5e-3);
+    EXPECT_EQ(to_string(voxels), "0.5vx");
+    EXPECT_EQ(to_string(world), "0.01");
+    for (const char* text : {"0.25vx", "3", "1e-05"}) {
+        const Length length = parse_length(text), again = parse_length(to_string(length));
+        EXPECT_EQ(again.value, length.value);
+        EXPECT_EQ(again.in_voxels, length.in_voxels);
     }
 }
 
-TEST_F(MeshSequence, GoesOnAfterAFrameItCannotUse) {
-    std::ofstream(in("s.0002.vdb")) << "not a grid at all";
-    const RunReport report = run();
+TEST(ParseLength, RefusesEverythingElse) {
+    for (const char* text : {"", "vx", "0", "-1", "0vx", "-0.5vx", "nan", "inf", "infvx", "1m", "1 vx ",
+                             "1,5", "0.5%", "abc", "1e999"})
+        EXPECT_THROW(parse_length(text), OptionError) << text;
+}
+
+TEST(MeshSequence, WritesOneGoodMeshPerFrame) {
+    const MovingSphere data(4);
+    int started = 0;
+    std::vector<int> finished;
+    MeshSequenceEvents events;
+    events.started = [&](const RunReport& report) {
+        ++started;
+        EXPECT_TRUE(finished.empty());
+        EXPECT_EQ(report.settings.count("tolerance"), 1u);
+    };
+    events.finished = [&](const FrameReport& row) {
+        finished.push_back(row.frame);
+        EXPECT_TRUE(fs::exists(row.output));
+    };
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), {}, events);
+    EXPECT_EQ(started, 1);
+    EXPECT_EQ(finished, (Numbers{1, 2, 3, 4}));
+    EXPECT_EQ(exit_code(report), 0);
     ASSERT_EQ(report.frames.size(), 4u);
-    EXPECT_EQ(report.frames[1].status, "failed");
-    EXPECT_NE(report.frames[1].message.find("s.0002.vdb"), std::string::npos);
-    EXPECT_EQ(report.frames[1].message.find('\n'), std::string::npos);
-    EXPECT_FALSE(fs::exists(in("m.0002.ply")));
-    for (const int frame : {1, 3, 4}) EXPECT_TRUE(fs::exists(expand_pattern(in("m.####.ply"), frame)));
+    for (int f = 1; f <= 4; ++f) {
+        const FrameReport& row = report.frames[f - 1];
+        EXPECT_EQ(row.frame, f);
+        EXPECT_EQ(row.time, f);
+        EXPECT_EQ(row.input, data.in(f));
+        EXPECT_EQ(row.output, data.out(f));
+        EXPECT_EQ(row.grid, "surface");
+        EXPECT_EQ(row.status, "ok") << row.message;
+        EXPECT_NEAR(row.voxel_size, kVoxel, 1e-12);
+        EXPECT_LE(row.max_error_vx, 0.5);
+        EXPECT_TRUE(row.closed && row.manifold);
+        EXPECT_EQ(row.components, 1u);
+        EXPECT_EQ(row.euler, 2);
+        EXPECT_EQ(row.self_intersections, 0u);
+        for (const char* stage :
+             {"read", "carry", "cover", "size", "relax", "delaunay", "convect", "certify", "write", "total"})
+            EXPECT_EQ(row.seconds.count(stage), 1u) << stage;
+        EXPECT_GT(row.peak_memory_mb, 0.0);
+
+        const TriangleMesh mesh = read_mesh(data.out(f));
+        EXPECT_EQ(mesh.points.size(), row.vertices);
+        EXPECT_EQ(mesh.triangles.size(), row.triangles);
+        EXPECT_EQ(mesh.ids.size(), row.vertices);
+        EXPECT_EQ(mesh.velocities.size(), row.vertices);
+        const MeshTopology t = mesh_topology(mesh);
+        EXPECT_TRUE(t.closed() && t.oriented() && t.manifold());
+        EXPECT_EQ(t.euler, 2);
+        for (const Vec3& p : mesh.points) EXPECT_NEAR((p - data.centre(f)).norm(), 0.3, 0.05 * kVoxel);
+    }
+    // Most ids go on.
+    const auto a = read_mesh(data.out(3)).ids, b = read_mesh(data.out(4)).ids;
+    const std::set<Id> before(a.begin(), a.end());
+    std::size_t kept = 0;
+    for (const Id id : b) kept += before.count(id);
+    EXPECT_GT(static_cast<double>(kept), 0.8 * static_cast<double>(b.size()));
+}
+
+TEST(MeshSequence, FollowsAGeneratedSequenceThatMergesAndSplits) {
+    TempFolder folder;
+    SampleSequenceOptions options;
+    options.frames = 6;
+    options.voxel = 0.03;
+    SampleSequence sequence("blobs", options);
+    std::vector<std::string> files;
+    for (int f = 0; f < sequence.size(); ++f) {
+        const SampleFrame frame = sequence.next();
+        files.push_back(folder.file("blobs." + std::to_string(f) + ".vdb"));
+        write_grids(files.back(), frame.surface, frame.velocity);
+    }
+    const RunReport report = mesh_sequence(find_frames(files), folder.file("meshes/m.####.obj"), {});
+    EXPECT_EQ(exit_code(report), 0);
+    ASSERT_EQ(report.frames.size(), 6u);
+    std::set<std::size_t> components;
+    for (const FrameReport& row : report.frames) {
+        EXPECT_EQ(row.status, "ok") << row.message;
+        EXPECT_EQ(row.euler, 2 * static_cast<long>(row.components));
+        components.insert(row.components);
+        EXPECT_TRUE(fs::exists(row.output)) << row.output;
+    }
+    EXPECT_EQ(components, (std::set<std::size_t>{1, 2}));
+}
+
+TEST(MeshSequence, GivesTheSameBytesEachTime) {
+    const MovingSphere data(3);
+    const auto bytes = [&](const std::string& name) {
+        mesh_sequence(data.input(), data.folder.file(name + ".#.ply"), {});
+        std::vector<std::string> files;
+        for (int f = 1; f <= 3; ++f) {
+            std::ifstream in(data.folder.file(name + "." + std::to_string(f) + ".ply"), std::ios::binary);
+            files.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+            EXPECT_GT(files.back().size(), 1000u);
+        }
+        return files;
+    };
+    EXPECT_EQ(bytes("a"), bytes("b"));
+}
+
+TEST(MeshSequence, GoesOnAfterABadFrame) {
+    const MovingSphere data(4);
+    fs::resize_file(data.in(2), fs::file_size(data.in(2)) / 2);
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), {});
+    EXPECT_EQ(status_of(report), (Words{"ok", "failed", "ok", "ok"}));
+    EXPECT_EQ(data.written(4), (Numbers{1, 3, 4}));
     EXPECT_EQ(exit_code(report), 3);
-
-    MeshSequenceOptions stop;
-    stop.on_existing = OnExisting::Overwrite;
-    stop.on_error = OnError::Stop;
-    EXPECT_EQ(run(stop).frames.size(), 2u);
+    const FrameReport& bad = report.frames[1];
+    EXPECT_EQ(bad.frame, 2);
+    EXPECT_NE(bad.message.find(data.in(2)), std::string::npos) << bad.message;
+    EXPECT_EQ(bad.message.find('\n'), std::string::npos);
+    // Frame 3 is tracked on from frame 1, so what is new is few, and the velocity is still per frame.
+    EXPECT_LT(static_cast<double>(report.frames[2].born),
+              0.3 * static_cast<double>(report.frames[2].particles));
+    const TriangleMesh mesh = read_mesh(data.out(3));
+    double along = 0.0, weight = 0.0;
+    for (std::size_t v = 0; v < mesh.points.size(); ++v) {
+        const Vec3 n = (mesh.points[v] - data.centre(3)).normalized();
+        along += mesh.velocities[v].dot(n) * n.x();
+        weight += n.x() * n.x();
+    }
+    EXPECT_NEAR(along / weight, data.step.x(), 0.1 * data.step.x());
 }
 
-TEST_F(MeshSequence, FailsWhenNoFrameCanBeUsed) {
-    for (int frame = 1; frame <= 4; ++frame)
-        std::ofstream(expand_pattern(in("s.####.vdb"), frame)) << "nothing";
-    EXPECT_EQ(exit_code(run()), 1);
+TEST(MeshSequence, StopsAtABadFrameWhenTold) {
+    const MovingSphere data(4);
+    std::ofstream(data.in(2), std::ios::trunc) << "version https://git-lfs.github.com/spec/v1\n";
+    MeshSequenceOptions options;
+    options.on_error = OnError::Stop;
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), options);
+    EXPECT_EQ(status_of(report), (Words{"ok", "failed"}));
+    EXPECT_EQ(data.written(4), (Numbers{1}));
+    EXPECT_EQ(exit_code(report), 3);
 }
 
-TEST_F(MeshSequence, WritesAnEmptyMeshForAnEmptyFrame) {
-    auto empty = openvdb::FloatGrid::create(0.3f);
-    empty->setGridClass(openvdb::GRID_LEVEL_SET);
-    empty->setName("surface");
-    empty->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
-    write(2, empty);
-    const RunReport report = run();
-    EXPECT_EQ(report.frames[1].status, "empty");
-    EXPECT_TRUE(read_mesh(in("m.0002.ply")).empty());
-    EXPECT_EQ(report.frames[2].status, "ok");
+TEST(MeshSequence, FailsWhenNoFrameIsGood) {
+    const MovingSphere data(2);
+    for (const int f : {1, 2}) std::ofstream(data.in(f), std::ios::trunc) << "no VDB";
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), {});
+    EXPECT_EQ(status_of(report), (Words{"failed", "failed"}));
+    EXPECT_EQ(exit_code(report), 1);
+    EXPECT_TRUE(data.written(2).empty());
+}
+
+TEST(MeshSequence, SaysThatAToleranceWasMissed) {
+    const MovingSphere data(2);
+    MeshSequenceOptions options;
+    options.tolerance = parse_length("0.01vx");
+    options.min_edge = parse_length("5vx");
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), options);
+    EXPECT_EQ(status_of(report), (Words{"tolerance_not_met", "tolerance_not_met"}));
+    EXPECT_NE(report.frames[0].message.find("tolerance 0.01"), std::string::npos) << report.frames[0].message;
+    EXPECT_EQ(data.written(2), (Numbers{1, 2}));
+    EXPECT_EQ(exit_code(report), 3);
+}
+
+TEST(MeshSequence, RefusesExistingOutputsBeforeAnyWork) {
+    const MovingSphere data(3);
+    std::ofstream(data.out(3)) << "mine";
+    MeshSequenceEvents events;
+    events.started = [](const RunReport&) { FAIL() << "started"; };
+    EXPECT_THROW(mesh_sequence(data.input(), data.pattern(), {}, events), OptionError);
+    EXPECT_EQ(data.written(3), (Numbers{3}));
+    std::string content;
+    std::ifstream(data.out(3)) >> content;
+    EXPECT_EQ(content, "mine");
+
+    MeshSequenceOptions options;
+    options.on_existing = OnExisting::Overwrite;
+    EXPECT_EQ(exit_code(mesh_sequence(data.input(), data.pattern(), options)), 0);
+    EXPECT_GT(read_mesh(data.out(3)).points.size(), 30u);
+}
+
+TEST(MeshSequence, SkipsExistingOutputsWhenTold) {
+    const MovingSphere data(4);
+    for (const int f : {1, 3}) std::ofstream(data.out(f)) << "mine";
+    MeshSequenceOptions options;
+    options.on_existing = OnExisting::Skip;
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), options);
+    EXPECT_EQ(status_of(report), (Words{"skipped", "ok", "skipped", "ok"}));
+    EXPECT_EQ(exit_code(report), 0);
+    EXPECT_EQ(fs::file_size(data.out(1)), 4u);
+    EXPECT_EQ(fs::file_size(data.out(3)), 4u);
+    EXPECT_EQ(data.written(4), (Numbers{1, 2, 3, 4}));
+}
+
+TEST(MeshSequence, PassesOverMissingFramesOrRefusesThem) {
+    const MovingSphere data(4);
+    fs::remove(data.in(2));
+    const InputSequence input = data.input();
+    ASSERT_EQ(input.missing, (Numbers{2}));
+    MeshSequenceOptions options;
+    options.on_missing = OnMissing::Stop;
+    EXPECT_THROW(mesh_sequence(input, data.pattern(), options), OptionError);
+    EXPECT_TRUE(data.written(4).empty());
+    const RunReport report = mesh_sequence(input, data.pattern(), {});
+    EXPECT_EQ(status_of(report), (Words{"ok", "ok", "ok"}));
+    EXPECT_EQ(data.written(4), (Numbers{1, 3, 4}));
     EXPECT_EQ(exit_code(report), 0);
 }
 
-TEST_F(MeshSequence, DoesNotTouchWhatExistsUnlessTold) {
-    std::ofstream(in("m.0003.ply")) << "mine";
-    EXPECT_THROW(run(), OptionError);
-    EXPECT_FALSE(fs::exists(in("m.0001.ply")));  // refused before any work
-
-    MeshSequenceOptions skip;
-    skip.on_existing = OnExisting::Skip;
-    const RunReport report = run(skip);
-    EXPECT_EQ(report.frames[2].status, "skipped");
-    EXPECT_EQ(fs::file_size(in("m.0003.ply")), 4u);
-    EXPECT_TRUE(fs::exists(in("m.0004.ply")));
+TEST(MeshSequence, WritesAnEmptyMeshForAnEmptyFrame) {
+    const MovingSphere data(3);
+    write_grids(data.in(2), empty_grid(kVoxel));
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), {});
+    EXPECT_EQ(status_of(report), (Words{"ok", "empty", "ok"}));
     EXPECT_EQ(exit_code(report), 0);
+    const TriangleMesh mesh = read_mesh(data.out(2));
+    EXPECT_TRUE(mesh.points.empty());
+    EXPECT_TRUE(mesh.triangles.empty());
+    // Afterwards it starts afresh: no id of frame 1 comes back.
+    const auto a = read_mesh(data.out(1)).ids, b = read_mesh(data.out(3)).ids;
+    const std::set<Id> before(a.begin(), a.end());
+    for (const Id id : b) EXPECT_EQ(before.count(id), 0u);
 }
 
-TEST_F(MeshSequence, RefusesWhatCannotWorkBeforeItStarts) {
-    EXPECT_THROW(mesh_sequence(frames(), in("m.####.xyz"), {}), OptionError);
-    EXPECT_THROW(mesh_sequence(frames(), in("m.ply"), {}), OptionError);
-    MeshSequenceOptions gap;
-    gap.on_missing = OnMissing::Stop;
-    fs::remove(in("s.0003.vdb"));
-    EXPECT_THROW(run(gap), OptionError);
-    EXPECT_EQ(run().frames.size(), 3u);
+TEST(MeshSequence, TakesTheVoxelOfTheFirstFrameWithASurface) {
+    const MovingSphere data(3);
+    write_grids(data.in(1), empty_grid(1.0));
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), {});
+    EXPECT_EQ(status_of(report), (Words{"empty", "ok", "ok"}));
+    for (const int f : {2, 3}) EXPECT_LE(report.frames[f - 1].max_error_vx, 0.5);
+    EXPECT_GT(report.frames[1].triangles, 60u);
+    EXPECT_EQ(report.settings.at("voxel_size").substr(0, 4), "0.04");
 }
 
-TEST_F(MeshSequence, GivesVelocitiesPerSecondWithARate) {
-    run();
-    MeshSequenceOptions rate;
-    rate.fps = 24.0;
-    mesh_sequence(frames(), in("r.####.ply"), rate);
-    const TriangleMesh per_frame = read_mesh(in("m.0003.ply")), per_second = read_mesh(in("r.0003.ply"));
-    ASSERT_EQ(per_frame.velocities.size(), per_second.velocities.size());
-    ASSERT_FALSE(per_frame.velocities.empty());
-    for (std::size_t v = 0; v < per_frame.velocities.size(); ++v)
-        EXPECT_LT((24.0 * per_frame.velocities[v] - per_second.velocities[v]).norm(),
-                  1e-4 * (1.0 + per_second.velocities[v].norm()));
+TEST(MeshSequence, TakesOnlyEmptyFramesToo) {
+    const MovingSphere data(2);
+    for (const int f : {1, 2}) write_grids(data.in(f), empty_grid(kVoxel));
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), {});
+    EXPECT_EQ(status_of(report), (Words{"empty", "empty"}));
+    EXPECT_EQ(exit_code(report), 0);
+    EXPECT_EQ(data.written(2), (Numbers{1, 2}));
 }
 
-TEST(ParseLength, TakesVoxelsAndWorldUnitsAndNothingElse) {
-    EXPECT_TRUE(parse_length("0.5vx").in_voxels);
-    EXPECT_EQ(parse_length("0.5vx").value, 0.5);
-    EXPECT_FALSE(parse_length("0.01").in_voxels);
-    EXPECT_EQ(parse_length("2vx").in_world(0.25), 0.5);
-    EXPECT_EQ(to_string(parse_length("0.5vx")), "0.5vx");
-    for (const char* bad : {"", "vx", "0", "-1vx", "nan", "inf", "1 vx", "1mm", "0.5vxx"})
-        EXPECT_THROW(parse_length(bad), OptionError) << bad;
+TEST(MeshSequence, GivesVelocitiesPerFrameOrPerSecond) {
+    const MovingSphere data(3, true);
+    const auto mean_velocity = [&](int f) {
+        Vec3 sum = Vec3::Zero();
+        const TriangleMesh mesh = read_mesh(data.out(f));
+        for (const Vec3& v : mesh.velocities) sum += v;
+        return Vec3(sum / static_cast<double>(mesh.velocities.size()));
+    };
+    MeshSequenceOptions options;
+    options.on_existing = OnExisting::Overwrite;
+    mesh_sequence(data.input(), data.pattern(), options);
+    for (const int f : {2, 3}) EXPECT_LT((mean_velocity(f) - data.step).norm(), 0.05 * data.step.norm());
+
+    // With a rate the velocity grid is per second too: too slow by 24 here, and so no better a guess than
+    // none.
+    options.fps = 24.0;
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), options);
+    EXPECT_DOUBLE_EQ(report.frames[2].time, 2.0 / 24.0);
+    const TriangleMesh mesh = read_mesh(data.out(3));
+    double along = 0.0, weight = 0.0;
+    for (std::size_t v = 0; v < mesh.points.size(); ++v) {
+        const Vec3 n = (mesh.points[v] - data.centre(3)).normalized();
+        along += mesh.velocities[v].dot(n) * n.x();
+        weight += n.x() * n.x();
+    }
+    EXPECT_NEAR(along / weight, 24.0 * data.step.x(), 0.1 * 24.0 * data.step.x());
+}
+
+TEST(MeshSequence, RefusesWrongRequestsBeforeAnyWork) {
+    const MovingSphere data(2);
+    const auto refuses = [&](const std::string& output, const MeshSequenceOptions& options = {}) {
+        EXPECT_THROW(mesh_sequence(data.input(), output, options), OptionError) << output;
+    };
+    refuses(data.folder.file("new/out.#.xyz"));
+    refuses(data.folder.file("new/out.#"));
+    refuses(data.folder.file("new/out.ply"));  // one name for two frames
+    MeshSequenceOptions options;
+    options.fps = 0.0;
+    refuses(data.folder.file("new/out.#.ply"), options);
+    options = {};
+    options.angle_deg = 120.0;
+    refuses(data.folder.file("new/out.#.ply"), options);
+    options = {};
+    options.tolerance = {-1.0, true};
+    refuses(data.folder.file("new/out.#.ply"), options);
+    options = {};
+    options.min_edge = Length{2.0, true};
+    options.max_edge = Length{1.0, true};
+    refuses(data.folder.file("new/out.#.ply"), options);
+    EXPECT_FALSE(fs::exists(data.folder.path() / "new"));
+    EXPECT_THROW(mesh_sequence({}, data.pattern(), {}), OptionError);
+    // A folder below a file cannot be made.
+    refuses(data.in(1) + "/out.#.ply");
+}
+
+TEST(MeshSequence, TakesOneFrameWithAPlainName) {
+    const MovingSphere data(1);
+    const RunReport report =
+        mesh_sequence(find_frames({data.in(1)}), data.folder.file("sub/folder/mesh.off"), {});
+    EXPECT_EQ(exit_code(report), 0);
+    EXPECT_GT(read_mesh(data.folder.file("sub/folder/mesh.off")).points.size(), 30u);
+}
+
+TEST(MeshSequence, StopsWhenAFileCannotBeWrittenAndKeepsTheOthers) {
+    const MovingSphere data(5);
+    fs::create_directory(data.out(2));  // a folder where the file should go
+    std::ofstream(fs::path(data.out(2)) / "content") << "mine";
+    MeshSequenceOptions options;
+    options.on_existing = OnExisting::Overwrite;
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), options);
+    ASSERT_GE(report.frames.size(), 2u);
+    EXPECT_LT(report.frames.size(), 5u);
+    EXPECT_EQ(report.frames[0].status, "ok");
+    EXPECT_EQ(report.frames[1].status, "failed");
+    EXPECT_NE(report.frames[1].message.find(data.out(2)), std::string::npos) << report.frames[1].message;
+    EXPECT_EQ(exit_code(report), 3);
+    EXPECT_GT(read_mesh(data.out(1)).points.size(), 30u);
+    EXPECT_TRUE(fs::exists(fs::path(data.out(2)) / "content"));
+}
+
+TEST(MeshSequence, NamesGridsThatAreNotThere) {
+    const MovingSphere data(2);
+    MeshSequenceOptions options;
+    options.grid = "phi";
+    const RunReport report = mesh_sequence(data.input(), data.pattern(), options);
+    EXPECT_EQ(exit_code(report), 1);
+    EXPECT_NE(report.frames[0].message.find("surface"), std::string::npos) << report.frames[0].message;
+}
+
+TEST(ExitCode, TellsGoodFromSomeFromNone) {
+    const auto code = [](const std::vector<std::string>& all) {
+        RunReport report;
+        for (const std::string& status : all) {
+            FrameReport row;
+            row.status = status;
+            report.frames.push_back(row);
+        }
+        return exit_code(report);
+    };
+    EXPECT_EQ(code({"ok", "empty", "skipped"}), 0);
+    EXPECT_EQ(code({"ok", "failed"}), 3);
+    EXPECT_EQ(code({"ok", "tolerance_not_met"}), 3);
+    EXPECT_EQ(code({"tolerance_not_met"}), 3);
+    EXPECT_EQ(code({"failed", "failed"}), 1);
+    RunReport open;
+    open.frames.resize(2);
+    open.frames[1].closed = false;
+    EXPECT_EQ(exit_code(open), 3);
 }
 
 }  // namespace

@@ -14,7 +14,8 @@ struct Particles {
     std::vector<double>
         spacing;         ///< Wanted distance h to the nearest neighbour; 1/h is the paper's k in world units.
     std::vector<Id> id;  ///< Unique over the run, never reused.
-    std::vector<Vec3> velocity;  ///< Displacement since the last frame; zero for the newborn.
+    std::vector<Vec3> velocity;  ///< Displacement since the last frame; that of their neighbours for the
+                                 ///< newborn, zero without any.
 
     std::size_t size() const { return position.size(); }
     bool empty() const { return position.empty(); }
