@@ -12,7 +12,9 @@ constexpr double kSeedDistance = 0.7;  // of the spacing: what a seed covers
 constexpr double kReach = 1.2;         // of the spacing: what a particle that is already there covers
 constexpr double kOffPlane =
     0.5;  // of the reach: how far from a particle's tangent plane surface counts as its own
-constexpr double kGrazing = 0.01;      // a lattice edge along the surface, up to this cosine, faces both ways
+// A lattice edge along the surface, up to this cosine, counts to either side where it crosses at the particle
+// itself.
+constexpr double kGrazing = 0.01, kHere = 0.1;  // kHere: resolutions
 constexpr double kLargestSeed =
     5.0;  // resolutions: a first spacing above this would step over small features
 
@@ -94,8 +96,10 @@ std::size_t cover(Particles& particles, const Surface& surface, const SizingLimi
         const double off_plane = std::max(kOffPlane * reach, 0.5 * resolution);
         grid.for_each_within(p, reach, [&](int c) {
             if (covered[c]) return;
-            const bool same_side = n.dot(crossings[c].outward.cast<double>()) > -kGrazing;
-            if (same_side && std::abs(n.dot(crossings[c].point - p)) < off_plane) covered[c] = 1;
+            const Vec3 way = crossings[c].point - p;
+            const double facing = n.dot(crossings[c].outward.cast<double>());
+            const bool same_side = facing > 0.0 || (facing > -kGrazing && way.norm() < kHere * resolution);
+            if (same_side && std::abs(n.dot(way)) < off_plane) covered[c] = 1;
         });
     };
     for (std::size_t i = 0; i < particles.size(); ++i)
