@@ -1,16 +1,24 @@
 // Seeding and what follows: the promises of the sampling headers on a sphere and its like.
 #include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+#include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <random>
 #include <set>
+#include <vector>
 
 #include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/sampling/adjacency.h"
+#include "isotrack/sampling/coordinate_descent.h"
 #include "isotrack/sampling/cover.h"
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
+#include "isotrack/surface/level_set.h"
 #include "isotrack/surface/shapes.h"
 
 namespace isotrack {
@@ -90,6 +98,78 @@ TEST(Cover, PutsNoTwoParticlesOnOnePlace) {
     EXPECT_EQ(cover(particles, *surface, limits_of(0.12), 1, next_id), 0u);
 }
 
+TEST(Cover, FindsEveryPartFromAColdStart) {
+    const double h = 0.05;
+    const auto surface = shapes::unite(
+        {shapes::sphere({0, 0, 0}, 0.8, h), shapes::torus({0, 0, 2}, 0.6, 0.1, h),
+         shapes::sphere({1.5, 0.3, 0}, 1.01 * 0.5 * std::sqrt(3.0) * h, h)});  // holds one lattice node
+    for (const std::uint64_t seed : {1u, 2u, 3u}) {
+        Particles particles;
+        Id next_id = 0;
+        SizingLimits limits = limits_of(0.1);
+        limits.min_edge = 0.5 * h;
+        limits.max_edge = 2.0;
+        cover(particles, *surface, limits, seed, next_id);
+        int sphere = 0, torus = 0, drop = 0;
+        for (const Vec3& p : particles.position)
+            ++((p - Vec3(1.5, 0.3, 0)).norm() < 3 * h ? drop : p.z() > 1.0 ? torus : sphere);
+        EXPECT_GT(sphere, 20);
+        EXPECT_GT(torus, 20);
+        EXPECT_GE(drop, 2);
+    }
+}
+
+TEST(Cover, FindsADropOfASingleVoxel) {
+    const auto grid = openvdb::FloatGrid::create(0.15f);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(0.05));
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    for (auto c = openvdb::CoordBBox(openvdb::Coord(-2), openvdb::Coord(2)).begin(); c; ++c)
+        grid->tree().setValue(*c, static_cast<float>(0.05 * (std::sqrt((*c).asVec3d().lengthSqr()) - 0.5)));
+    const LevelSet level_set(grid);
+    ASSERT_EQ(level_set.crossing_count(), 6u);
+    Particles particles;
+    Id next_id = 0;
+    SizingLimits limits = limits_of(0.1);
+    limits.min_edge = 0.025;
+    EXPECT_GE(cover(particles, level_set, limits, 1, next_id), 4u);  // enough for a tetrahedron
+}
+
+TEST(Cover, MendsOnlyTheHole) {
+    const auto surface = shapes::sphere({0.01, 0.02, 0.03}, 1.0, 0.05);
+    Particles particles;
+    Id next_id = 0;
+    cover(particles, *surface, limits_of(0.15), 1, next_id);
+    const std::size_t before = particles.size();
+    std::vector<char> keep(before, 1);
+    for (std::size_t i = 0; i < before; ++i) keep[i] = particles.position[i].x() < 0.8;
+    particles.retain(keep);
+    const std::size_t left = particles.size();
+    ASSERT_LT(left, before);
+    const std::size_t added = cover(particles, *surface, limits_of(0.15), 1, next_id);
+    EXPECT_GT(added, 0u);
+    EXPECT_LE(added, 2 * (before - left));
+    for (std::size_t i = left; i < particles.size(); ++i) {
+        EXPECT_GT(particles.position[i].x(), 0.7);
+        EXPECT_GE(particles.id[i], static_cast<Id>(before));
+    }
+}
+
+TEST(Cover, DoesNotLetOneSideOfASheetStandForTheOther) {
+    const double h = 0.05;
+    const auto plate = shapes::plate({0, 0, 0}, 1.0, 2.0 * h, h);
+    Particles particles;
+    Id next_id = 0;
+    cover(particles, *plate, limits_of(0.3), 1, next_id);
+    std::vector<char> keep(particles.size());
+    for (std::size_t i = 0; i < particles.size(); ++i) keep[i] = particles.normal[i].z() > -0.5;
+    particles.retain(keep);
+    const std::size_t left = particles.size();
+    cover(particles, *plate, limits_of(0.3), 1, next_id);
+    std::size_t below = 0;
+    for (std::size_t i = left; i < particles.size(); ++i) below += particles.normal[i].z() < -0.5;
+    EXPECT_GT(below, 20u);
+}
+
 TEST(ColourGroups, HoldEveryParticleOnceAndNoTwoNeighbours) {
     const Particles particles = random_on_unit_sphere(500, 0.15);
     const Adjacency adjacency = adjacency_of(particles);
@@ -122,6 +202,143 @@ TEST(Relax, SpreadsRandomPointsAndKeepsThemOnTheSurface) {
     for (std::size_t i = 0; i < particles.size(); ++i) {
         EXPECT_NEAR(particles.position[i].norm(), 1.0, 1e-4);
         EXPECT_LT((particles.normal[i] - particles.position[i].normalized()).norm(), 1e-4);
+    }
+}
+
+TEST(Relax, PacksNearlyAsDenselyAsHexagons) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const std::size_t count = 600;
+    const double ideal = std::sqrt(8.0 * 3.14159265358979 / (std::sqrt(3.0) * static_cast<double>(count)));
+    Particles particles = random_on_unit_sphere(count, ideal);
+    for (int sweep = 0; sweep < 30; ++sweep) relax(particles, adjacency_of(particles), *sphere, 1);
+    double least = 1e300;
+    for (std::size_t i = 0; i < count; ++i) least = std::min(least, nearest_distance(particles, i));
+    EXPECT_GE(least, 0.75 * ideal);
+}
+
+TEST(Relax, FollowsTheSpacingThatIsAskedFor) {
+    // Twice as dense on the right as on the left.
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    Particles particles = random_on_unit_sphere(800, 0.1);
+    const auto wanted = [](const Vec3& p) { return 0.12 - 0.04 * p.x(); };
+    for (int round = 0; round < 40; ++round) {
+        for (std::size_t i = 0; i < particles.size(); ++i)
+            particles.spacing[i] = wanted(particles.position[i]);
+        relax(particles, adjacency_of(particles), *sphere, 3);
+    }
+    double left = 0.0, right = 0.0;
+    int lefts = 0, rights = 0;
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+        const double d = nearest_distance(particles, i);
+        if (particles.position[i].x() < -0.7) left += d, ++lefts;
+        if (particles.position[i].x() > 0.7) right += d, ++rights;
+    }
+    EXPECT_GT(left / lefts, 1.2 * right / rights);
+}
+
+TEST(Relax, GivesTheSameBitsAtAnyThreadCount) {
+    const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.3, 0.05);
+    const auto run = [&](std::size_t threads) {
+        const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+        Particles particles;
+        Id next_id = 0;
+        cover(particles, *torus, limits_of(0.12), 1, next_id);
+        for (int round = 0; round < 3; ++round) relax(particles, adjacency_of(particles), *torus, 4);
+        return particles;
+    };
+    const Particles one = run(1), two = run(2);
+    EXPECT_EQ(one.position, two.position);
+    EXPECT_EQ(one.normal, two.normal);
+}
+
+TEST(Relax, StopsWhenAllAreAtRest) {
+    // The corners of an icosahedron cannot be better placed.
+    const double g = 0.5 * (1.0 + std::sqrt(5.0));
+    Particles particles;
+    for (const double a : {-1.0, 1.0})
+        for (const double b : {-g, g})
+            for (const Vec3& p : {Vec3(0, a, b), Vec3(a, b, 0), Vec3(b, 0, a)})
+                particles.add(p.normalized(), p.normalized(), 1.0, static_cast<Id>(particles.size()));
+    const auto start = particles.position;
+    EXPECT_LE(relax(particles, adjacency_of(particles), *shapes::sphere({0, 0, 0}, 1.0, 0.1), 50), 3);
+    for (std::size_t i = 0; i < start.size(); ++i) EXPECT_LT((particles.position[i] - start[i]).norm(), 0.05);
+    EXPECT_EQ(relax(particles, adjacency_of(particles), *shapes::sphere({0, 0, 0}, 1.0, 0.1), 0), 0);
+}
+
+/// Particles all over the unit sphere, well spread.
+Particles settled_on_unit_sphere(std::size_t count, double spacing) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    Particles particles = random_on_unit_sphere(count, spacing);
+    for (int sweep = 0; sweep < 20; ++sweep) relax(particles, adjacency_of(particles), *sphere, 1);
+    return particles;
+}
+
+TEST(UpdateSpacing, GetsSmallerTheLargerTheError) {
+    const Particles start = settled_on_unit_sphere(400, 0.19);
+    const Adjacency adjacency = adjacency_of(start);
+    SizingLimits limits{};
+    limits.tolerance = 0.01;
+    limits.angle = 1.0;
+    limits.min_edge = 0.01;
+    limits.max_edge = 10.0;
+    double last = 1e300, no_evidence = 0.0;
+    for (const double error : {-1.0, 0.001, 0.004, 0.007, 0.01, 0.014, 0.1}) {
+        Particles particles = start;
+        SizingEvidence evidence;
+        evidence.error.assign(particles.size(), error);
+        evidence.thickness.assign(particles.size(), std::numeric_limits<double>::infinity());
+        update_spacing(particles, adjacency, evidence, limits);
+        const double h = particles.spacing[0];
+        EXPECT_GE(h, 0.19 / std::sqrt(2.0) - 1e-12) << error;  // 1/h^2 changes by at most 2
+        EXPECT_LE(h, 0.19 * std::sqrt(2.0) + 1e-12) << error;
+        if (error < 0.0) {
+            no_evidence = h;
+            continue;
+        }
+        EXPECT_LE(h, last) << error;
+        last = h;
+    }
+    EXPECT_NEAR(no_evidence, 0.19, 1e-12);
+    EXPECT_LT(last, 0.19);
+}
+
+TEST(UpdateSpacing, KeepsBelowTheAngleAndTheThickness) {
+    Particles particles = settled_on_unit_sphere(400, 0.19);
+    const Adjacency adjacency = adjacency_of(particles);
+    SizingLimits limits{};
+    limits.tolerance = 1.0;  // says nothing
+    limits.angle = 0.1;      // on the unit sphere the spacing itself
+    limits.min_edge = 0.01;
+    limits.max_edge = 10.0;
+    SizingEvidence evidence;
+    evidence.error.assign(particles.size(), 0.0);
+    evidence.thickness.assign(particles.size(), std::numeric_limits<double>::infinity());
+    Particles by_angle = particles;
+    for (int round = 0; round < 10; ++round) update_spacing(by_angle, adjacency, evidence, limits);
+    for (const double h : by_angle.spacing) EXPECT_NEAR(h, 0.1, 0.01);
+    limits.angle = 3.0;
+    evidence.thickness[7] = 0.08;
+    for (int round = 0; round < 10; ++round) update_spacing(particles, adjacency, evidence, limits);
+    EXPECT_LE(particles.spacing[7], 0.08);
+}
+
+TEST(SpacingFromCurvature, GivesTheEdgeWhoseErrorIsTheTolerance) {
+    // An equilateral triangle of edge h on a sphere of radius R is h^2 / 6R from it.
+    SizingLimits limits{};
+    limits.tolerance = 0.01;
+    limits.angle = 1.5;
+    limits.min_edge = 1e-3;
+    limits.max_edge = 10.0;
+    for (const double radius : {0.5, 1.0, 3.0}) {
+        const auto sphere = shapes::sphere({0, 0, 0}, radius, 0.01);
+        const auto probe = sphere->probe();
+        const double h = spacing_from_curvature(*probe, {radius, 0, 0}, {1, 0, 0}, 0.01, limits);
+        const double error = h * h / (6.0 * radius);
+        EXPECT_LE(error, limits.tolerance);
+        EXPECT_GE(error, 0.5 * limits.tolerance);
+        limits.max_edge = 0.1;
+        EXPECT_EQ(spacing_from_curvature(*probe, {radius, 0, 0}, {1, 0, 0}, 0.01, limits), 0.1);
+        limits.max_edge = 10.0;
     }
 }
 
@@ -165,6 +382,72 @@ TEST(Uncrowded, DropsCrowdedParticlesButNoTwoNeighbours) {
     EXPECT_GT(dropped, 50u);
 }
 
+TEST(Uncrowded, LeavesAGoodPackingAlone) {
+    const Particles particles = settled_on_unit_sphere(400, 0.19);
+    const auto keep = uncrowded(particles, adjacency_of(particles));
+    EXPECT_EQ(std::count(keep.begin(), keep.end(), 1), 400);
+}
+
+TEST(Uncrowded, DropsTheMostCrowdedOfItsNeighbours) {
+    const Particles particles = random_on_unit_sphere(600, 0.15);
+    const Adjacency adjacency = adjacency_of(particles);
+    const auto keep = uncrowded(particles, adjacency);
+    // Every crowded particle went, or a neighbour did.
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+        if (!keep[i] || nearest_distance(particles, i) > 0.64 * 0.15) continue;
+        bool neighbour_went = false;
+        for (const int j : adjacency.of(i)) neighbour_went = neighbour_went || !keep[j];
+        EXPECT_TRUE(neighbour_went);
+    }
+}
+
+/// The triangles of particles on the unit sphere: their convex hull.
+std::vector<Triangle> hull(const Particles& particles) {
+    const Tetrahedra cells = tetrahedralise(particles.position);
+    std::vector<Triangle> triangles;
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+        if (!cells.is_infinite(static_cast<int>(c))) continue;
+        const auto& f = Tetrahedra::kFacet[cells.index_of(static_cast<int>(c), Tetrahedra::kInfinite)];
+        triangles.push_back({cells.vertices[c][f[0]], cells.vertices[c][f[2]], cells.vertices[c][f[1]]});
+    }
+    return triangles;
+}
+
+TEST(FillSparse, AddsInLargeTrianglesAndNoTwoSideBySide) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    Particles particles = settled_on_unit_sphere(100, 0.2);  // a good packing would be 0.38 apart
+    const auto triangles = hull(particles);
+    const std::size_t before = particles.size();
+    Id next_id = 1000;
+    const std::size_t added = fill_sparse(particles, triangles, *sphere, next_id);
+    EXPECT_GT(added, 20u);
+    ASSERT_EQ(particles.size(), before + added);
+    EXPECT_EQ(next_id, static_cast<Id>(1000 + added));
+    for (std::size_t i = before; i < particles.size(); ++i) {
+        EXPECT_NEAR(particles.position[i].norm(), 1.0, 1e-5);
+        EXPECT_NEAR(particles.spacing[i], 0.2, 1e-12);
+        EXPECT_GT(nearest_distance(particles, i), 0.85 * 0.2 * 0.99);
+    }
+    // Filled again and again it comes to an end, with no triangle left that is too large.
+    for (int round = 0; round < 20 && fill_sparse(particles, hull(particles), *sphere, next_id) > 0;
+         ++round) {
+    }
+    EXPECT_EQ(fill_sparse(particles, hull(particles), *sphere, next_id), 0u);
+    for (const auto& [a, b, c] : hull(particles)) {
+        const Vec3 &p = particles.position[a], &q = particles.position[b], &r = particles.position[c];
+        const double radius =
+            (q - p).norm() * (r - q).norm() * (p - r).norm() / (2.0 * (q - p).cross(r - p).norm());
+        EXPECT_LE(radius, 0.85 * 0.2 + 1e-9);
+    }
+}
+
+TEST(FillSparse, LeavesAGoodPackingAlone) {
+    Particles particles = settled_on_unit_sphere(400, 0.19);
+    Id next_id = 400;
+    EXPECT_EQ(fill_sparse(particles, hull(particles), *shapes::sphere({0, 0, 0}, 1.0, 0.1), next_id), 0u);
+    EXPECT_EQ(fill_sparse(particles, {}, *shapes::sphere({0, 0, 0}, 1.0, 0.1), next_id), 0u);
+}
+
 TEST(Densify, AddsWhereThereIsRoomShrinksWhereNotAndComesToAnEnd) {
     const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
     Particles particles;
@@ -180,6 +463,106 @@ TEST(Densify, AddsWhereThereIsRoomShrinksWhereNotAndComesToAnEnd) {
     while (densify(particles, {{{0, 0, 1}, 0.4}}, *sphere, 0.05, next_id) > 0) ASSERT_LT(++calls, 20);
     EXPECT_EQ(particles.size(), 2u);
     EXPECT_DOUBLE_EQ(particles.spacing[0], 0.05);
+}
+
+/// The DT, as the descent asks for it.
+class DelaunayNeighbours final : public MovingNeighbours {
+public:
+    explicit DelaunayNeighbours(const std::vector<Vec3>& points)
+        : dt_(make_tetrahedralisation(UpdateStrategy::Rebuild)) {
+        dt_->assign(points);
+    }
+    void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
+    void moved(int i, const Vec3& to) override { dt_->move(i, to); }
+    void added(int i, const Vec3& at, int near) override { EXPECT_EQ(dt_->insert(at, near), i); }
+    void removed(int i) override { dt_->remove(i); }
+    void settle() override { dt_->settle(); }
+
+private:
+    std::unique_ptr<Tetrahedralisation> dt_;
+};
+
+TEST(CoordinateDescent, SpreadsParticlesOverAnEllipsoidByItsCurvature) {
+    const auto ellipsoid = shapes::ellipsoid({0, 0, 0}, {1.0, 0.5, 0.5}, 0.02);
+    SizingLimits limits{};
+    limits.tolerance = 1.0;
+    limits.angle = 0.35;  // 20 degrees
+    limits.min_edge = 0.01;
+    limits.max_edge = 1.0;
+    Particles particles;
+    Id next_id = 0;
+    cover(particles, *ellipsoid, limits, 1, next_id);
+    const Id first_new = next_id;
+    const std::size_t start = particles.size();
+    DelaunayNeighbours structure(particles.position);
+    const CoordinateDescentReport report =
+        coordinate_descent(particles, structure, *ellipsoid, limits, next_id);
+    EXPECT_TRUE(report.converged);
+    EXPECT_LE(report.steps, 40 * start);
+    EXPECT_EQ(particles.size(), start + report.born - report.died);
+    EXPECT_EQ(next_id, first_new + static_cast<Id>(report.born));
+    EXPECT_EQ(std::set<Id>(particles.id.begin(), particles.id.end()).size(), particles.size());
+    EXPECT_TRUE(std::is_sorted(particles.id.begin(), particles.id.end()));  // the others keep their order
+    const auto probe = ellipsoid->probe();
+    // Curvature is 4 at the tips and between 0.5 and 2 at the waist, so the tips are denser.
+    double tip = 0.0, waist = 0.0;
+    int tips = 0, waists = 0;
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+        EXPECT_LT(std::abs(probe->value(particles.position[i])), 1e-4);
+        const double x = std::abs(particles.position[i].x()), d = nearest_distance(particles, i);
+        if (x > 0.85) tip += d, ++tips;
+        if (x < 0.4) waist += d, ++waists;
+        EXPECT_GT(d, 0.35 * particles.spacing[i]);  // sigma_min 0.5 is a distance of 0.71 spacings, before
+                                                    // neighbours move
+    }
+    ASSERT_GT(tips, 0);
+    ASSERT_GT(waists, 0);
+    EXPECT_LT(tip / tips, 0.8 * waist / waists);
+}
+
+TEST(CoordinateDescent, KeepsItsBudgetAndItsPopulationWhenTold) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.05);
+    SizingLimits limits = limits_of(0.1);
+    limits.max_edge = 1.0;
+    limits.angle = 0.3;
+    for (const int sweeps : {0, 1, 3}) {
+        Particles particles = random_on_unit_sphere(150, 0.3);
+        DelaunayNeighbours structure(particles.position);
+        CoordinateDescentOptions options;
+        options.most_sweeps = sweeps;
+        options.population = false;
+        Id next_id = 150;
+        const auto report = coordinate_descent(particles, structure, *sphere, limits, next_id, options);
+        EXPECT_LE(report.steps, 150u * static_cast<std::size_t>(sweeps));
+        EXPECT_EQ(report.born + report.died, 0u);
+        EXPECT_EQ(particles.size(), 150u);
+        EXPECT_EQ(next_id, 150);
+        EXPECT_FALSE(report.converged);
+    }
+    Particles none;
+    DelaunayNeighbours structure(none.position);
+    Id next_id = 0;
+    EXPECT_TRUE(coordinate_descent(none, structure, *sphere, limits, next_id).converged);
+}
+
+TEST(CoordinateDescent, DependsOnItsSeedAlone) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.05);
+    SizingLimits limits = limits_of(0.1);
+    limits.max_edge = 1.0;
+    limits.angle = 0.2;  // more particles than there are
+    const auto run = [&](std::uint64_t seed) {
+        Particles particles = random_on_unit_sphere(100, 0.3);
+        DelaunayNeighbours structure(particles.position);
+        CoordinateDescentOptions options;
+        options.seed = seed;
+        Id next_id = 100;
+        const auto report = coordinate_descent(particles, structure, *sphere, limits, next_id, options);
+        EXPECT_GT(report.born, 50u);
+        return particles.position;
+    };
+    const auto a = run(1);
+    EXPECT_EQ(a, run(1));
+    EXPECT_NE(a, run(2));
 }
 
 }  // namespace
