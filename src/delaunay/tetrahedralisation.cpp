@@ -1,99 +1,209 @@
 #include "isotrack/delaunay/tetrahedralisation.h"
 
-#include <CGAL/Delaunay_triangulation_3.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Triangulation_cell_base_with_info_3.h>
-#include <CGAL/Triangulation_vertex_base_with_info_3.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <utility>
+
+#include "delaunay/living.h"
 
 namespace isotrack {
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using VertexBase = CGAL::Triangulation_vertex_base_with_info_3<int, Kernel>;
-using CellBase =
-    CGAL::Triangulation_cell_base_with_info_3<int, Kernel, CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
-using Delaunay =
-    CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
+/// The paper's scores (4.3).
+constexpr int kBroken = 2, kNotDelaunay = 1, kLimit = 4;
 
-Tetrahedra flat_copy(const Delaunay& dt) {
-    Tetrahedra result;
-    if (dt.dimension() < 3) return result;
-    int count = 0;
-    for (auto cell = dt.all_cells_begin(); cell != dt.all_cells_end(); ++cell) cell->info() = count++;
-    result.vertices.reserve(count);
-    result.neighbours.reserve(count);
-    for (auto cell = dt.all_cells_begin(); cell != dt.all_cells_end(); ++cell) {
-        std::array<int, 4> v, n;
-        for (int k = 0; k < 4; ++k) {
-            v[k] = dt.is_infinite(cell->vertex(k)) ? Tetrahedra::kInfinite : cell->vertex(k)->info();
-            n[k] = cell->neighbor(k)->info();
-        }
-        result.vertices.push_back(v);
-        result.neighbours.push_back(n);
-    }
-    return result;
-}
+/// What one change costs, in units of what building costs per vertex.
+constexpr double kInsertCost = 2.0, kRemoveCost = 10.0;
 
-class RebuiltTetrahedralisation final : public Tetrahedralisation {
+/// What all strategies share: the true positions, and the DT that follows them.
+class Follower : public Tetrahedralisation {
 public:
     void assign(const std::vector<Vec3>& points) override {
         points_ = points;
-        removed_.assign(points.size(), 0);
-        settle();
+        there_.assign(points.size(), 1);
+        dt_.assign(points);
+        assigned();
     }
-    int insert(const Vec3& point, int) override {
+    const Tetrahedra& cells() override { return dt_.cells(); }
+    std::vector<int> take_changed() override { return dt_.take_changed(); }
+    const UpdateProfile& profile() const override { return dt_.profile(); }
+
+protected:
+    virtual void assigned() {}
+
+    int note_insert(const Vec3& point) {
         points_.push_back(point);
-        removed_.push_back(0);
+        there_.push_back(1);
         return static_cast<int>(points_.size()) - 1;
     }
-    void move(int vertex, const Vec3& to) override { points_[vertex] = to; }
-    void remove(int vertex) override { removed_[vertex] = 1; }
 
+    /// The number of a vertex that is in the DT, `near` itself or none.
+    int hint(int near) const { return near >= 0 && dt_.has(near) ? near : -1; }
+
+    /// Brings a vertex to its true position: in place where the DT allows it.
+    void follow(int v) {
+        if (!dt_.has(v)) {
+            dt_.insert(v, points_[v], -1);
+        } else if (dt_.star_at(v, points_[v]) == LivingDelaunay::Star::Delaunay) {
+            dt_.set_position(v, points_[v]);
+        } else {
+            dt_.relocate(v, points_[v]);
+        }
+    }
+
+    /// Vertices left out because another was on their place, which may have gone since.
+    void insert_left_out() {
+        if (dt_.size() == static_cast<std::size_t>(std::count(there_.begin(), there_.end(), 1))) return;
+        for (std::size_t v = 0; v < points_.size(); ++v)
+            if (there_[v] && !dt_.has(static_cast<int>(v))) dt_.insert(static_cast<int>(v), points_[v], -1);
+    }
+
+    std::vector<Vec3> points_;  // by number
+    std::vector<char> there_;
+    LivingDelaunay dt_;
+};
+
+/// Every move is followed at once.
+class MovedTetrahedralisation final : public Follower {
+public:
+    int insert(const Vec3& point, int near) override {
+        const int v = note_insert(point);
+        dt_.insert(v, point, hint(near));
+        return v;
+    }
+    void move(int vertex, const Vec3& to) override {
+        points_[vertex] = to;
+        follow(vertex);
+    }
+    void remove(int vertex) override {
+        there_[vertex] = 0;
+        if (dt_.has(vertex)) dt_.remove(vertex);
+    }
+    void neighbours(int vertex, std::vector<int>& result) const override { dt_.neighbours(vertex, result); }
+    void settle() override { insert_left_out(); }
+};
+
+/// A move is followed when the star has been wrong for too long.
+class LazyTetrahedralisation final : public Follower {
+public:
+    int insert(const Vec3& point, int near) override {
+        const int v = note_insert(point);
+        score_.push_back(0);
+        dt_.insert(v, point, hint(near));
+        return v;
+    }
+    void move(int vertex, const Vec3& to) override {
+        points_[vertex] = to;
+        if (!dt_.has(vertex)) return;
+        switch (dt_.star_at(vertex, to)) {
+            case LivingDelaunay::Star::Delaunay:
+                dt_.set_position(vertex, to);
+                score_[vertex] = 0;
+                return;
+            case LivingDelaunay::Star::EmbeddedOnly:
+                score_[vertex] += kNotDelaunay;
+                break;
+            case LivingDelaunay::Star::Broken:
+                score_[vertex] += kBroken;
+        }
+        if (score_[vertex] < kLimit) return;
+        dt_.relocate(vertex, to);
+        score_[vertex] = 0;
+    }
+    void remove(int vertex) override {
+        there_[vertex] = 0;
+        if (dt_.has(vertex)) dt_.remove(vertex);
+    }
+    void neighbours(int vertex, std::vector<int>& result) const override { dt_.neighbours(vertex, result); }
+    void settle() override {
+        for (std::size_t v = 0; v < points_.size(); ++v)
+            if (there_[v] && dt_.has(static_cast<int>(v)) &&
+                dt_.position(static_cast<int>(v)) != points_[v]) {
+                follow(static_cast<int>(v));
+                score_[v] = 0;
+            }
+        insert_left_out();
+    }
+
+private:
+    void assigned() override { score_.assign(points_.size(), 0); }
+    std::vector<int> score_;
+};
+
+/// Changes are noted, and made by `settle`: one by one while they are few, else by building anew.
+class BatchedTetrahedralisation final : public Follower {
+public:
+    explicit BatchedTetrahedralisation(bool always_rebuild) : always_rebuild_(always_rebuild) {}
+
+    int insert(const Vec3& point, int near) override {
+        const int v = note_insert(point);
+        near_.resize(points_.size(), -1);
+        near_[v] = near;
+        pending_.resize(points_.size(), 1);
+        ++inserted_;
+        return v;
+    }
+    void move(int vertex, const Vec3& to) override {
+        points_[vertex] = to;
+        moved_ += !pending_[vertex];
+        pending_[vertex] = 1;
+    }
+    void remove(int vertex) override {
+        there_[vertex] = 0;
+        ++removed_;
+        pending_[vertex] = 1;
+    }
     void neighbours(int vertex, std::vector<int>& result) const override {
-        result.clear();
-        if (vertex >= static_cast<int>(adjacency_.size())) return;  // not there at the last settle
-        for (const int w : adjacency_.of(vertex))
-            if (!removed_[w]) result.push_back(w);
+        dt_.neighbours(vertex, result);
+        result.erase(std::remove_if(result.begin(), result.end(), [&](int w) { return !there_[w]; }),
+                     result.end());
     }
 
     void settle() override {
-        std::vector<Vec3> points;
-        std::vector<int> number;
-        for (std::size_t i = 0; i < points_.size(); ++i)
-            if (!removed_[i]) {
-                points.push_back(points_[i]);
-                number.push_back(static_cast<int>(i));
-            }
-        cells_ = tetrahedralise(points);
-        for (auto& cell : cells_.vertices)
-            for (int& v : cell)
-                if (v >= 0) v = number[v];
-        adjacency_ = vertex_adjacency(cells_, points_.size());
+        if (inserted_ + moved_ + removed_ == 0) return;
+        const double cost = kInsertCost * static_cast<double>(inserted_ + moved_) +
+                            kRemoveCost * static_cast<double>(moved_ + removed_);
+        if (always_rebuild_ || cost > static_cast<double>(dt_.size()))
+            dt_.assign(points_, there_);
+        else
+            update();
+        assigned();
     }
-    const Tetrahedra& cells() const override { return cells_; }
-    std::size_t relocated() const override { return 0; }
 
 private:
-    std::vector<Vec3> points_;
-    std::vector<char> removed_;
-    Tetrahedra cells_;
-    Adjacency adjacency_;
+    void assigned() override {
+        pending_.assign(points_.size(), 0);
+        near_.assign(points_.size(), -1);
+        inserted_ = moved_ = removed_ = 0;
+    }
+
+    void update() {
+        for (std::size_t i = 0; i < points_.size(); ++i) {
+            if (!pending_[i]) continue;
+            const int v = static_cast<int>(i);
+            if (!there_[v]) {
+                if (dt_.has(v)) dt_.remove(v);
+            } else if (dt_.has(v)) {
+                follow(v);
+            } else {
+                dt_.insert(v, points_[v], hint(near_[v]));
+            }
+        }
+        insert_left_out();
+    }
+
+    bool always_rebuild_;
+    std::vector<char> pending_;
+    std::vector<int> near_;
+    std::size_t inserted_ = 0, moved_ = 0, removed_ = 0;
 };
 
 }  // namespace
 
 Tetrahedra tetrahedralise(const std::vector<Vec3>& points) {
-    std::vector<std::pair<Kernel::Point_3, int>> numbered;
-    numbered.reserve(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i)
-        numbered.emplace_back(Kernel::Point_3(points[i].x(), points[i].y(), points[i].z()),
-                              static_cast<int>(i));
-    const Delaunay dt(numbered.begin(), numbered.end());
-    return flat_copy(dt);
+    LivingDelaunay dt;
+    dt.assign(points);
+    return dt.cells();
 }
 
 Adjacency vertex_adjacency(const Tetrahedra& cells, std::size_t count) {
@@ -124,12 +234,28 @@ Adjacency vertex_adjacency(const Tetrahedra& cells, std::size_t count) {
     return result;
 }
 
-const char* name_of(UpdateStrategy) {
-    return "rebuild";
+const char* name_of(UpdateStrategy strategy) {
+    switch (strategy) {
+        case UpdateStrategy::Rebuild:
+            return "rebuild";
+        case UpdateStrategy::Move:
+            return "move";
+        case UpdateStrategy::Lazy:
+            return "lazy";
+        default:
+            return "auto";
+    }
 }
 
-std::unique_ptr<Tetrahedralisation> make_tetrahedralisation(UpdateStrategy) {
-    return std::make_unique<RebuiltTetrahedralisation>();
+std::unique_ptr<Tetrahedralisation> make_tetrahedralisation(UpdateStrategy strategy) {
+    switch (strategy) {
+        case UpdateStrategy::Move:
+            return std::make_unique<MovedTetrahedralisation>();
+        case UpdateStrategy::Lazy:
+            return std::make_unique<LazyTetrahedralisation>();
+        default:
+            return std::make_unique<BatchedTetrahedralisation>(strategy == UpdateStrategy::Rebuild);
+    }
 }
 
 }  // namespace isotrack

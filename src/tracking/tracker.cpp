@@ -87,7 +87,7 @@ std::vector<double> thickness_of(const Particles& particles, const Adjacency& ad
 class DelaunayNeighbours final : public MovingNeighbours {
 public:
     explicit DelaunayNeighbours(const std::vector<Vec3>& points)
-        : dt_(make_tetrahedralisation(UpdateStrategy::Rebuild)) {
+        : dt_(make_tetrahedralisation(UpdateStrategy::Lazy)) {
         dt_->assign(points);
     }
     void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
@@ -95,7 +95,7 @@ public:
     void added(int, const Vec3& at, int near) override { dt_->insert(at, near); }
     void removed(int i) override { dt_->remove(i); }
     void settle() override { dt_->settle(); }
-    std::size_t relocated() const { return dt_->relocated(); }
+    std::size_t relocated() const { return dt_->profile().relocated; }
 
 private:
     std::unique_ptr<Tetrahedralisation> dt_;

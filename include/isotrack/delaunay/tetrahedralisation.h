@@ -41,9 +41,26 @@ struct Tetrahedra {
 
 /// How a DT follows its points.
 enum class UpdateStrategy {
-    Rebuild  ///< Positions are only noted; `settle` builds anew. Neighbours are those of the last `settle`.
+    Rebuild,  ///< Changes are only noted; `settle` builds anew.
+    Move,     ///< The paper's algorithm 3: a vertex moves in place when its star stays embedded and Delaunay, else
+              ///< it is inserted anew, then removed from where it was. Exact after every call.
+    Lazy,     ///< The paper's section 4.3: a vertex has a second position, in the DT, and follows its true one only
+              ///< when that has broken the embedding (score 2 each) or the Delaunay property (score 1) up to a score
+              ///< of 4.
+    Auto      ///< Changes are only noted; `settle` does what is predicted to be cheaper: relocate what moved, or
+              ///< build anew.
 };
 const char* name_of(UpdateStrategy strategy);
+
+/// What the upkeep of a DT did since `assign`: the rows of the paper's table 1.
+struct UpdateProfile {
+    struct Row {
+        std::size_t calls = 0;
+        double seconds = 0.0;
+    };
+    Row build, remove, insert, locate, predicates;
+    std::size_t relocated = 0;  ///< Vertices that were inserted anew and removed.
+};
 
 /// Points that move, come and go, and their DT. Vertices are numbered by the caller's order and keep their
 /// number until they are removed. Between calls the DT may lag behind the points, as the strategy likes;
@@ -60,18 +77,21 @@ public:
     virtual void move(int vertex, const Vec3& to) = 0;
     virtual void remove(int vertex) = 0;
 
-    /// The vertices that share an edge with `vertex`, in no particular but reproducible order.
+    /// The vertices that share an edge with `vertex`, in no particular but reproducible order; for the strategies that
+    /// only note changes as of the last `settle`.
     virtual void neighbours(int vertex, std::vector<int>& result) const = 0;
 
     /// Makes the DT that of the points where they are now.
     virtual void settle() = 0;
 
     /// The cells as of the last `settle`, none when the points span no volume. A vertex on the very place of
-    /// another belongs to no cell.
-    virtual const Tetrahedra& cells() const = 0;
+    /// another belongs to no cell. A slot that lost its cell has only infinite vertices and is its own neighbour.
+    virtual const Tetrahedra& cells() = 0;
 
-    /// Vertices relocated one by one since `assign`.
-    virtual std::size_t relocated() const = 0;
+    /// The slots of `cells()` that were written since the last call.
+    virtual std::vector<int> take_changed() = 0;
+
+    virtual const UpdateProfile& profile() const = 0;
 };
 
 std::unique_ptr<Tetrahedralisation> make_tetrahedralisation(UpdateStrategy strategy);
