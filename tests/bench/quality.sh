@@ -22,7 +22,12 @@ for data in "$@"; do
     name=$(basename "$data" .vdb)
     measure=3
     [ ! -f "$data" ] || measure=1
-    "$programs/isotrack_peers" "$data" --measure "$measure" --csv >"$work/rows.csv" || [ $? -eq 3 ]
+    code=0
+    "$programs/isotrack_peers" "$data" --measure "$measure" --csv >"$work/rows.csv" || code=$?
+    if [ "$code" -ne 0 ] && [ "$code" -ne 3 ]; then
+        echo "- ${name//[.#]*/}: not measured" >>"$work/missed"
+        continue
+    fi
     # Means over the frames, but the worst of them for errors and angles and the sum for pairs.
     LC_ALL=C awk -F, -v shape="${name//[.#]*/}" -v missed="$work/missed" '
         NR == 1 { for (i = 1; i <= NF; i++) column[$i] = i; next }
