@@ -5,6 +5,7 @@
 #include <CGAL/Triangulation_cell_base_with_info_3.h>
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -247,9 +248,9 @@ LivingDelaunay::Star LivingDelaunay::star_at(int number, const Vec3& p) {
     dt.incident_cells(v, std::back_inserter(cells));
     Star star = Star::Delaunay;
     for (const Cell& c : cells)
-        if (!dt.is_infinite(c) && CGAL::orientation(c->vertex(0)->point(), c->vertex(1)->point(),
-                                                    c->vertex(2)->point(),
-                                                    c->vertex(3)->point()) != CGAL::POSITIVE) {
+        if (!dt.is_infinite(c) &&
+            CGAL::orientation(c->vertex(0)->point(), c->vertex(1)->point(), c->vertex(2)->point(),
+                              c->vertex(3)->point()) != CGAL::POSITIVE) {
             star = Star::Broken;
             break;
         }
@@ -259,9 +260,8 @@ LivingDelaunay::Star LivingDelaunay::star_at(int number, const Vec3& p) {
         for (int k = 0; k < 4 && star == Star::Delaunay; ++k) {
             const Cell c = cells[f], other = c->neighbor(k);
             const Vertex apex = other->vertex(other->index(c));
-            const bool inside = dt.is_infinite(apex)
-                                    ? false
-                                    : dt.side_of_sphere(c, apex->point()) == CGAL::ON_BOUNDED_SIDE;
+            const bool inside =
+                dt.is_infinite(apex) ? false : dt.side_of_sphere(c, apex->point()) == CGAL::ON_BOUNDED_SIDE;
             if (inside) star = dt.is_infinite(c) ? Star::Broken : Star::EmbeddedOnly;
         }
     v->set_point(before);
@@ -283,7 +283,10 @@ const Tetrahedra& LivingDelaunay::cells() {
 
 std::vector<int> LivingDelaunay::take_changed() {
     cells();
-    return std::exchange(impl_->changed, {});
+    std::vector<int> changed = std::exchange(impl_->changed, {});
+    std::sort(changed.begin(), changed.end());
+    changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+    return changed;
 }
 
 const UpdateProfile& LivingDelaunay::profile() const {

@@ -14,8 +14,8 @@ public:
     LivingDelaunay();
     ~LivingDelaunay();
 
-    /// Starts anew with vertex i at points[i], where `there` (all when empty) is set; of several points on one
-    /// place one has a vertex.
+    /// Starts anew with vertex i at points[i], where `there` (all when empty) is set; of several points on
+    /// one place one has a vertex.
     void assign(const std::vector<Vec3>& points, const std::vector<char>& there = {});
     /// False when another vertex is on that very place; the number has then no vertex. `near`: the number of
     /// a vertex close by, or -1.
@@ -39,7 +39,7 @@ public:
 
     /// Slots that hold no cell any more have only infinite vertices and are their own neighbours.
     const Tetrahedra& cells();
-    /// The slots of `cells()` written since the last call or the last `assign`, which writes all.
+    /// The slots of `cells()` written since the last call, ascending; `assign` writes all.
     std::vector<int> take_changed();
 
     const UpdateProfile& profile() const;  ///< Since the first `assign`.

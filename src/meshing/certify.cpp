@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "delaunay/circumcentre.h"
+
 namespace isotrack {
 namespace {
 
@@ -89,6 +91,46 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
         }
     });
     return errors;
+}
+
+std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell,
+                                  int facet, Surface::Probe& probe) {
+    constexpr int kHalvings = 16;
+    const auto centre_of = [&](int c, Vec3& centre) {
+        const auto& v = cells.vertices[c];
+        const Vec3& p = points[v[0]];
+        if (!circumcentre(points[v[1]] - p, points[v[2]] - p, points[v[3]] - p, centre)) return false;
+        centre += p;
+        return true;
+    };
+    const auto& v = cells.vertices[cell];
+    const Vec3 &a = points[v[Tetrahedra::kFacet[facet][0]]], u = points[v[Tetrahedra::kFacet[facet][1]]] - a,
+               w = points[v[Tetrahedra::kFacet[facet][2]]] - a, normal = u.cross(w);
+    const double length2 = normal.squaredNorm();
+    if (!(length2 > 0.0)) return std::nullopt;
+    // The dual edge is on the line middle + t axis.
+    const Vec3 to_middle =
+        (u.squaredNorm() * w.cross(normal) + w.squaredNorm() * normal.cross(u)) / (2.0 * length2);
+    const Vec3 middle = a + to_middle, axis = normal / std::sqrt(length2);
+    Vec3 inner, outer;
+    if (!centre_of(cell, inner)) return std::nullopt;
+    const double low = (inner - middle).dot(axis);
+    const int other = cells.neighbours[cell][facet];
+    double high = std::max(low, 0.0) + to_middle.norm();
+    if (!cells.is_infinite(other)) {
+        if (!centre_of(other, outer)) return std::nullopt;
+        high = (outer - middle).dot(axis);
+    }
+    const double start = std::clamp(0.0, std::min(low, high), std::max(low, high));
+    const auto value = [&](double t) { return probe.value(middle + t * axis); };
+    const bool start_inside = value(start) < 0.0;
+    double inside = start_inside ? start : low, outside = start_inside ? high : start;
+    if (!(value(inside) < 0.0) || value(outside) < 0.0) return std::nullopt;
+    for (int halving = 0; halving < kHalvings; ++halving) {
+        const double t = 0.5 * (inside + outside);
+        (value(t) < 0.0 ? inside : outside) = t;
+    }
+    return middle + 0.5 * (inside + outside) * axis;
 }
 
 std::vector<double> crossing_distances(const std::vector<Vec3>& points,

@@ -4,25 +4,16 @@
 
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
+#include "delaunay/circumcentre.h"
 #include "isotrack/delaunay/predicates.h"
 
 namespace isotrack {
 namespace {
 
 constexpr char kOutside = 0, kInside = 1, kFlat = 2;
-constexpr double kFlatness = 1e-10;  // of the cube of the cell's size: below it the circumcentre is noise
-
-/// Circumcentre relative to p0 from the three edge vectors; false when the cell is too flat.
-bool circumcentre(const Vec3& a, const Vec3& b, const Vec3& c, Vec3& centre) {
-    const Vec3 bc = b.cross(c);
-    const double volume6 = a.dot(bc);
-    const double size = std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
-    if (!(std::abs(volume6) > kFlatness * size * std::sqrt(size))) return false;
-    centre = (a.squaredNorm() * bc + b.squaredNorm() * c.cross(a) + c.squaredNorm() * a.cross(b)) /
-             (2.0 * volume6);
-    return true;
-}
+constexpr double kClear = 0.5;  // length of the gradient: below it sheets are less than about a voxel apart
 
 /// The facet through which the flow leaves a cell: the circumcentre lies beyond it. -1 when the cell holds
 /// its circumcentre.
@@ -39,31 +30,48 @@ int flow_exit(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell
 
 CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& points,
                              const std::vector<Vec3>& normals, const Surface& surface) {
-    CellLabels labels(cells.size(), kOutside);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells.size(), 512), [&](const auto& range) {
+    std::vector<int> all(cells.size());
+    std::iota(all.begin(), all.end(), 0);
+    CellLabels labels;
+    update_labels(labels, all, cells, points, normals, surface);
+    return labels;
+}
+
+void update_labels(CellLabels& labels, const std::vector<int>& changed, const Tetrahedra& cells,
+                   const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
+                   const Surface& surface) {
+    labels.resize(cells.size(), kOutside);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, changed.size(), 512), [&](const auto& range) {
         const auto probe = surface.probe();
-        for (std::size_t c = range.begin(); c < range.end(); ++c) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            const int c = changed[i];
             const auto& v = cells.vertices[c];
-            if (cells.is_infinite(static_cast<int>(c))) continue;
+            labels[c] = kOutside;
+            if (cells.is_infinite(c)) continue;
             bool one_sheet = true;
             for (int a = 0; a < 4; ++a)
                 for (int b = a + 1; b < 4; ++b)
                     one_sheet = one_sheet && normals[v[a]].dot(normals[v[b]]) >= 0.0;
             const Vec3& p0 = points[v[0]];
             const Vec3 e1 = points[v[1]] - p0, e2 = points[v[2]] - p0, e3 = points[v[3]] - p0;
-            Vec3 place = 0.25 * (e1 + e2 + e3);
-            if (one_sheet && !circumcentre(e1, e2, e3, place)) {
-                labels[c] = kFlat;
-                continue;
+            const Surface::Sample centroid = probe->sample(p0 + 0.25 * (e1 + e2 + e3));
+            double value = centroid.value;
+            if (one_sheet && centroid.gradient.norm() > kClear) {
+                Vec3 centre;
+                if (!circumcentre(e1, e2, e3, centre)) {
+                    labels[c] = kFlat;
+                    continue;
+                }
+                value = probe->value(p0 + centre);
             }
-            labels[c] = probe->value(p0 + place) < 0.0 ? kInside : kOutside;
+            labels[c] = value < 0.0 ? kInside : kOutside;
         }
     });
     // Flat cells are rare; their flow ends at a cell that is not flat after a few steps, or it is cut off.
     constexpr int kLongestFlow = 64;
-    for (std::size_t c = 0; c < cells.size(); ++c) {
+    for (const int c : changed) {
         if (labels[c] != kFlat) continue;
-        int at = static_cast<int>(c);
+        int at = c;
         for (int step = 0; step < kLongestFlow && labels[at] == kFlat; ++step) {
             const int exit = flow_exit(cells, points, at);
             if (exit < 0) break;
@@ -71,7 +79,6 @@ CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& p
         }
         labels[c] = labels[at] == kInside ? kInside : kOutside;
     }
-    return labels;
 }
 
 CellLabels pure_convection(const Tetrahedra& cells, const std::vector<Vec3>& points) {

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
 #include "isotrack/sampling/particle_grid.h"
 
 namespace isotrack {
+
+constexpr double kPi = 3.14159265358979323846;
 
 std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency,
                             const PopulationBand& band) {
@@ -72,42 +75,51 @@ std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& trian
 
 std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface,
                     double min_spacing, Id& next_id) {
-    constexpr double kApart = 0.5, kShrink = 0.6;
+    constexpr double kApart = 0.7, kShrink = 0.6;
+    constexpr int kAround = 6;
     if (shortages.empty()) return 0;
     PointGrid grid(2.0 * surface.resolution());
     for (std::size_t i = 0; i < particles.size(); ++i)
         grid.insert(particles.position[i], static_cast<int>(i));
-    std::vector<char> shrunk(particles.size(), 0);
+    const std::size_t before = particles.size();
+    std::vector<char> surrounded(particles.size(), 0);
     const auto probe = surface.probe();
-    std::size_t changes = 0;
-    for (const Shortage& s : shortages) {
-        const auto p = probe->project(s.place);
-        if (!p) continue;
-        const Vec3 n = probe->normal(*p);
-        double h = std::max(s.spacing, min_spacing);
+    /// Adds a particle at the projection of `place`, at most `h` apart from the others, or returns the one
+    /// that is already there.
+    const auto add = [&](const Vec3& place, double h) {
         int nearest = -1;
-        double least = 1e300;
+        const auto p = probe->project(place);
+        if (!p) return nearest;
+        const Vec3 n = probe->normal(*p);
+        double least = kApart * h * kApart * h;
         grid.for_each_within(*p, kApart * h, [&](int i, double d2) {
-            if (d2 >= least || !(particles.normal[i].dot(n) > 0.0)) return;
+            if (d2 > least || !(particles.normal[i].dot(n) > 0.0)) return;
             least = d2;
             nearest = i;
         });
-        if (nearest >= 0) {
-            h = std::max(min_spacing, kShrink * std::min(h, particles.spacing[nearest]));
-            if (std::sqrt(least) < kApart * h) {
-                if (shrunk[nearest] || particles.spacing[nearest] <= min_spacing) continue;
-                particles.spacing[nearest] = h;
-                shrunk[nearest] = 1;
-                ++changes;
-                continue;
-            }
-        }
+        const double apart = std::sqrt(least);
+        if (nearest >= 0 && apart < kApart * particles.spacing[nearest]) return nearest;
         grid.insert(*p, static_cast<int>(particles.size()));
-        particles.add(*p, n, h, next_id++);
-        shrunk.push_back(1);
-        ++changes;
+        particles.add(*p, n, std::max(apart / kApart, min_spacing), next_id++);
+        surrounded.push_back(1);
+        return -1;
+    };
+    for (const Shortage& s : shortages) {
+        const double wanted = std::max(s.spacing, min_spacing);
+        const int there = add(s.place, wanted);
+        if (there < 0 || surrounded[there]) continue;
+        surrounded[there] = 1;
+        const double h = kShrink * std::min(wanted, particles.spacing[there]);
+        if (h < min_spacing) continue;
+        particles.spacing[there] = h;
+        const Vec3 p = particles.position[there], a = particles.normal[there].unitOrthogonal(),
+                   b = particles.normal[there].cross(a);
+        for (int k = 0; k < kAround; ++k) {
+            const double angle = 2.0 * kPi * k / kAround;
+            add(p + h * (std::cos(angle) * a + std::sin(angle) * b), h);
+        }
     }
-    return changes;
+    return particles.size() - before;
 }
 
 }  // namespace isotrack

@@ -464,6 +464,12 @@ double LevelSet::reach() const {
 Box LevelSet::bounds() const {
     return impl_->bounds;
 }
+Eigen::Affine3d LevelSet::lattice() const {
+    Eigen::Affine3d result;
+    result.linear() = impl_->map.linear;
+    result.translation() = impl_->map.shift;
+    return result;
+}
 std::vector<Surface::Crossing> LevelSet::crossings() const {
     return impl_->crossings;
 }

@@ -10,6 +10,11 @@ constexpr double kFirstDamping = 1e-3;   // the paper starts at 1, which only ha
 constexpr double kLargestDamping = 1e4;  // steps are then too short to matter
 constexpr double kLeastGradient = 1e-3;  // of a distance's 1: below it nothing is known
 
+/// The nodes of the default lattice, which reaches a node beyond the box on each side.
+Eigen::Array3i nodes_across(const Box& box, double h) {
+    return ((box.sizes() / h).array().ceil()).cast<int>() + 3;
+}
+
 }  // namespace
 
 std::optional<Vec3> Surface::Probe::project(const Vec3& start) {
@@ -44,13 +49,23 @@ Vec3 Surface::Probe::normal(const Vec3& p) {
     return gradient / length;
 }
 
+Eigen::Affine3d Surface::lattice() const {
+    const Box box = bounds();
+    Eigen::Affine3d result = Eigen::Affine3d::Identity();
+    if (box.isEmpty()) return result;
+    const double h = resolution();
+    const Eigen::Array3i n = nodes_across(box, h);
+    result.translate(box.center() - 0.5 * h * (n - 1).cast<double>().matrix()).scale(h);
+    return result;
+}
+
 std::vector<Surface::Crossing> Surface::crossings() const {
     std::vector<Crossing> result;
     const Box box = bounds();
     if (box.isEmpty()) return result;
     const double h = resolution();
-    const Eigen::Array3i n = ((box.sizes() / h).array().ceil()).cast<int>() + 3;
-    const Vec3 origin = box.center() - 0.5 * h * (n - 1).cast<double>().matrix();
+    const Eigen::Array3i n = nodes_across(box, h);
+    const Vec3 origin = lattice().translation();
     const auto access = probe();
 
     // Two layers of values at a time: the layer x and the one after it.

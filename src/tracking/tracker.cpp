@@ -11,30 +11,27 @@
 
 #include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/error.h"
-#include "isotrack/meshing/certify.h"
 #include "isotrack/meshing/convection.h"
 #include "isotrack/meshing/fit.h"
 #include "isotrack/meshing/manifold.h"
 #include "isotrack/meshing/self_intersections.h"
+#include "isotrack/meshing/untangle.h"
 #include "isotrack/sampling/coordinate_descent.h"
 #include "isotrack/sampling/cover.h"
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
+#include "tracking/inspection.h"
 
 namespace isotrack {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
-constexpr int kSweepsPerRound = 3;
-constexpr int kSizingSteps = 3,
-              kCertifySteps =
-                  6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
-constexpr double kSuspect =
-    0.6;  // of the tolerance: above it a triangle's largest error is searched for between the samples
-constexpr int kCertifyRounds = 12, kRelaxedCertifyRounds = 4;
+constexpr int kSweepsPerRound = 3, kMendingSweeps = 2;
+constexpr int kCertifyRounds = 12;
 constexpr int kFitSteps = 4;
+constexpr int kUntanglingPasses = 4;
 constexpr double kAngleFloor = 2.0;  // resolutions: sharp edges are as round as the grid makes them
 constexpr double kLeastSpacing =
     0.05;  // resolutions: for shreds of a single voxel, where nothing coarser closes
@@ -53,25 +50,15 @@ private:
     std::chrono::steady_clock::time_point start_;
 };
 
-/// Everything that is derived from the particles' positions at one moment.
-struct Build {
-    Tetrahedra cells;
-    CarvedSurface carved;
-    Adjacency adjacency;
-    std::vector<double> thickness;
-    std::vector<Vec3> vertices;    ///< Of the mesh: fitted when asked for.
-    std::vector<Vec3> on_surface;  ///< The same vertices before the fit.
-
-    /// The triangles as particle indices, without those that stand on a midpoint.
-    std::vector<Triangle> particle_triangles() const {
-        std::vector<Triangle> result;
-        for (const Triangle& t : carved.triangles) {
-            const Triangle p = {carved.particle[t[0]], carved.particle[t[1]], carved.particle[t[2]]};
-            if (p[0] >= 0 && p[1] >= 0 && p[2] >= 0) result.push_back(p);
-        }
-        return result;
+/// The triangles as particle indices, without those that stand on a midpoint.
+std::vector<Triangle> particle_triangles(const CarvedSurface& carved) {
+    std::vector<Triangle> result;
+    for (const Triangle& t : carved.triangles) {
+        const Triangle p = {carved.particle[t[0]], carved.particle[t[1]], carved.particle[t[2]]};
+        if (p[0] >= 0 && p[1] >= 0 && p[2] >= 0) result.push_back(p);
     }
-};
+    return result;
+}
 
 /// The distance to the nearest Delaunay neighbour that faces the other way.
 std::vector<double> thickness_of(const Particles& particles, const Adjacency& adjacency) {
@@ -112,6 +99,10 @@ struct Tracker::Impl {
     TrackerOptions options;
     Particles particles;
     Id next_id = 0;
+    std::unique_ptr<Tetrahedralisation> dt = make_tetrahedralisation(UpdateStrategy::Auto);
+    CellLabels labels;
+    std::size_t in_dt = 0;  // particles that are in the DT, by their index
+    std::vector<int> near;  // per particle not yet in it: one close by, or -1
 
     explicit Impl(const TrackerOptions& o) : options(o) {
         if (!(o.tolerance > 0.0))
@@ -199,48 +190,61 @@ struct Tracker::Impl {
         return n - particles.size();
     }
 
-    Build build(const Surface& surface, std::map<std::string, double>& seconds) {
-        Build b;
-        {
-            const StageTimer timer(seconds, "delaunay");
-            round_to_float(particles);
-            b.cells = tetrahedralise(particles.position);
-            b.adjacency = vertex_adjacency(b.cells, particles.size());
-            b.thickness = thickness_of(particles, b.adjacency);
+    /// Brings the DT to the particles, all of them anew or only those that were added at the end.
+    void tetrahedralise(bool anew, std::map<std::string, double>& seconds) {
+        const StageTimer timer(seconds, "delaunay");
+        round_to_float(particles);
+        if (anew) {
+            dt->assign(particles.position);
+            labels.clear();
+        } else {
+            for (std::size_t i = in_dt; i < particles.size(); ++i) dt->insert(particles.position[i], near[i]);
+            dt->settle();
         }
-        {
-            const StageTimer timer(seconds, "convect");
-            const CellLabels labels =
-                options.reconstruction == Reconstruction::Pure
-                    ? pure_convection(b.cells, particles.position)
-                    : guided_convection(b.cells, particles.position, particles.normal, surface);
-            b.carved = carve(b.cells, labels, particles.position);
-            std::size_t midpoint = 0;
-            for (const int p : b.carved.particle)
-                b.vertices.push_back(p >= 0
-                                         ? particles.position[p]
-                                         : Vec3(b.carved.midpoints[midpoint++].cast<float>().cast<double>()));
-            b.on_surface = b.vertices;
-        }
-        if (options.fit) fit_vertices(b, surface, seconds);
-        return b;
+        in_dt = particles.size();
+        near.assign(in_dt, -1);
     }
 
-    void fit_vertices(Build& b, const Surface& surface, std::map<std::string, double>& seconds) {
+    /// The mesh of the DT as it is, before any fit.
+    FrameMesh carve_mesh(const Surface& surface, std::map<std::string, double>& seconds) {
+        const StageTimer timer(seconds, "convect");
+        FrameMesh mesh;
+        const std::vector<int> changed = dt->take_changed();
+        const Tetrahedra& cells = dt->cells();
+        if (options.reconstruction == Reconstruction::Pure)
+            labels = pure_convection(cells, particles.position);
+        else
+            update_labels(labels, changed, cells, particles.position, particles.normal, surface);
+        mesh.carved = carve(cells, labels, particles.position);
+        if (options.reconstruction == Reconstruction::Guided)
+            for (int pass = 0; pass < kUntanglingPasses && !mesh.carved.pinched.empty() &&
+                               untangle(labels, cells, particles.position, surface, mesh.carved.pinched);
+                 ++pass)
+                mesh.carved = carve(cells, labels, particles.position);
+        std::size_t midpoint = 0;
+        for (const int p : mesh.carved.particle)
+            mesh.vertices.push_back(
+                p >= 0 ? particles.position[p]
+                       : Vec3(mesh.carved.midpoints[midpoint++].cast<float>().cast<double>()));
+        mesh.on_surface = mesh.vertices;
+        return mesh;
+    }
+
+    void fit_vertices(FrameMesh& mesh, const Surface& surface, std::map<std::string, double>& seconds) {
         const StageTimer timer(seconds, "fit");
         const auto probe = surface.probe();
         std::vector<Vec3> normals;
-        for (std::size_t v = 0; v < b.vertices.size(); ++v) {
-            const int p = b.carved.particle[v];
-            normals.push_back(p >= 0 ? particles.normal[p] : probe->normal(b.vertices[v]));
+        for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+            const int p = mesh.carved.particle[v];
+            normals.push_back(p >= 0 ? particles.normal[p] : probe->normal(mesh.vertices[v]));
         }
-        fit(b.vertices, b.carved.triangles, normals, surface, kFitSteps);
-        for (Vec3& v : b.vertices) v = v.cast<float>().cast<double>();
+        fit(mesh.vertices, mesh.carved.triangles, normals, surface, kFitSteps);
+        for (Vec3& v : mesh.vertices) v = v.cast<float>().cast<double>();
     }
 
     /// Puts fitted vertices back where their triangles cross others, a ring further each time, until none
     /// cross. Facets of a DT do not.
-    static void undo_crossing_fits(Build& b) {
+    static void undo_crossing_fits(FrameMesh& b) {
         TriangleMesh mesh;
         mesh.triangles = b.carved.triangles;
         std::vector<char> undo(b.vertices.size(), 0);
@@ -265,96 +269,57 @@ struct Tracker::Impl {
         }
     }
 
-    void size(const Build& b, const Surface& surface, const SizingLimits& l) {
+    void size(const FrameMesh& mesh, const Adjacency& adjacency, const Surface& surface,
+              const SizingLimits& l) {
+        constexpr int kSizingSteps = 3;  // barycentric lattice of the samples: with the centroid
         SizingEvidence evidence;
-        evidence.thickness = b.thickness;
+        evidence.thickness = thickness_of(particles, adjacency);
         evidence.error.assign(particles.size(), -1.0);
-        const auto errors = triangle_errors(b.vertices, b.carved.triangles, surface, kSizingSteps);
+        const auto errors = triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps);
         for (std::size_t t = 0; t < errors.size(); ++t)
-            for (const int v : b.carved.triangles[t])
-                if (const int p = b.carved.particle[v]; p >= 0)
+            for (const int v : mesh.carved.triangles[t])
+                if (const int p = mesh.carved.particle[v]; p >= 0)
                     evidence.error[p] = std::max(evidence.error[p], errors[t].largest);
-        update_spacing(particles, b.adjacency, evidence, l);
+        update_spacing(particles, adjacency, evidence, l);
+    }
+
+    /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
+    std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, const Surface& surface,
+                     const SizingLimits& l) {
+        const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
+        const std::size_t added =
+            densify(particles, shortages(mesh, inspection, dt->cells(), particles, surface, l), surface,
+                    least, next_id);
+        near.resize(particles.size(), -1);
+        return added;
     }
 
     /// The newborn move like the neighbours that were there before; alone among newborn they rest.
-    void inherit_velocities(const Adjacency& adjacency, Id first_new) {
-        for (std::size_t i = 0; i < particles.size(); ++i) {
-            if (particles.id[i] < first_new) continue;
-            Vec3 sum = Vec3::Zero();
-            int count = 0;
-            for (const int j : adjacency.of(i)) {
-                if (particles.id[j] >= first_new || !(particles.normal[i].dot(particles.normal[j]) > 0.0))
-                    continue;
-                sum += particles.velocity[j];
-                ++count;
-            }
-            if (count > 0) particles.velocity[i] = sum / count;
-        }
+    void inherit_velocities(const std::vector<Triangle>& triangles, Id first_new) {
+        std::vector<int> count(particles.size(), 0);
+        const auto is_new = [&](int i) { return particles.id[i] >= first_new; };
+        for (std::size_t i = 0; i < particles.size(); ++i)
+            if (is_new(static_cast<int>(i))) particles.velocity[i].setZero();
+        for (const Triangle& t : triangles)
+            for (const int i : t)
+                for (const int j : t) {
+                    if (!is_new(i) || is_new(j)) continue;
+                    particles.velocity[i] += particles.velocity[j];
+                    ++count[i];
+                }
+        for (std::size_t i = 0; i < particles.size(); ++i)
+            if (count[i] > 0) particles.velocity[i] /= count[i];
     }
 
-    /// New particles where the mesh fails. Returns how many; 0 when it passes.
-    std::size_t refine(const Build& b, const Surface& surface, const SizingLimits& l,
-                       const std::vector<Surface::Crossing>& crossings) {
-        std::vector<Shortage> shortages;
-        const auto errors =
-            triangle_errors(b.vertices, b.carved.triangles, surface, kCertifySteps, kSuspect * l.tolerance);
-        for (std::size_t t = 0; t < errors.size(); ++t) {
-            if (errors[t].largest <= l.tolerance) continue;
-            double h = l.max_edge;
-            for (const int v : b.carved.triangles[t])
-                if (const int p = b.carved.particle[v]; p >= 0) h = std::min(h, particles.spacing[p]);
-            shortages.push_back({errors[t].where, 0.7 * h});
-        }
-        const auto distances = crossing_distances(b.vertices, b.carved.triangles, crossings, l.tolerance);
-        for (std::size_t c = 0; c < crossings.size(); ++c)
-            if (!(distances[c] <= l.tolerance))
-                shortages.push_back({crossings[c].point, 2.0 * surface.resolution()});
-        for (std::size_t e = 0; e + 1 < b.carved.complex_edge_ends.size(); e += 2) {
-            const int p = b.carved.complex_edge_ends[e], q = b.carved.complex_edge_ends[e + 1];
-            shortages.push_back({0.5 * (particles.position[p] + particles.position[q]),
-                                 0.7 * std::min(particles.spacing[p], particles.spacing[q])});
-        }
-        const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
-        return densify(particles, shortages, surface, least, next_id);
-    }
-
-    /// The errors of the mesh as it will be written, both ways.
-    static void measure(const Build& b, const Surface& surface, const SizingLimits& l,
-                        const std::vector<Surface::Crossing>& crossings, TrackedFrame& frame) {
-        const StageTimer timer(frame.seconds, "certify");
-        const auto errors =
-            triangle_errors(b.vertices, b.carved.triangles, surface, kCertifySteps, kSuspect * l.tolerance);
-        double sum = 0.0, weight = 0.0;
-        for (std::size_t t = 0; t < errors.size(); ++t) {
-            const auto& [i, j, k] = b.carved.triangles[t];
-            const double area = (b.vertices[j] - b.vertices[i]).cross(b.vertices[k] - b.vertices[i]).norm();
-            frame.max_error = std::max(frame.max_error, errors[t].largest);
-            sum += area * errors[t].mean_square;
-            weight += area;
-        }
-        double back = 0.0;
-        std::size_t found = 0;
-        for (const double d :
-             crossing_distances(b.vertices, b.carved.triangles, crossings, 3.0 * l.tolerance)) {
-            if (!std::isfinite(d)) continue;
-            frame.max_error = std::max(frame.max_error, d);
-            back += d * d;
-            ++found;
-        }
-        frame.lost_crossings = crossings.size() - found;
-        frame.rms_error = std::sqrt(
-            std::max(weight > 0.0 ? sum / weight : 0.0, found > 0 ? back / static_cast<double>(found) : 0.0));
-        frame.within_tolerance = frame.max_error <= l.tolerance && frame.lost_crossings == 0;
-    }
-
-    void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
+    void sample(const Surface& surface, const SizingLimits& l,
+                const std::vector<Surface::Crossing>& crossings, bool warm, TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     TrackedFrame advance(const Surface& surface, const Motion& motion);
 };
 
 /// Rounds of: mesh, measure, size, relax, births and deaths. More of them the more particles are new.
-void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame) {
+void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l,
+                           const std::vector<Surface::Crossing>& crossings, bool warm, TrackedFrame& frame) {
     auto& seconds = frame.seconds;
     const double fresh =
         particles.empty() ? 0.0 : static_cast<double>(frame.seeded) / static_cast<double>(particles.size());
@@ -363,20 +328,34 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool w
                    static_cast<int>(std::lround(std::min(1.0, 4.0 * fresh) * (kColdRounds - kWarmRounds)))
              : kColdRounds;
     for (int round = 0; round < rounds; ++round) {
-        const Build b = build(surface, seconds);
+        tetrahedralise(true, seconds);
+        FrameMesh mesh = carve_mesh(surface, seconds);
+        if (options.fit) fit_vertices(mesh, surface, seconds);
+        const Adjacency adjacency = vertex_adjacency(dt->cells(), particles.size());
         {
             const StageTimer timer(seconds, "size");
-            size(b, surface, l);
+            size(mesh, adjacency, surface, l);
         }
         const StageTimer timer(seconds, "relax");
-        frame.sweeps += relax(particles, b.adjacency, surface, kSweepsPerRound);
+        frame.sweeps += relax(particles, adjacency, surface, kSweepsPerRound);
         if (round + 1 == rounds) break;
-        const auto keep = uncrowded(particles, b.adjacency);
-        fill_sparse(particles, b.particle_triangles(), surface, next_id);
-        auto all = keep;
-        all.resize(particles.size(), 1);
-        particles.retain(all);
+        auto keep = uncrowded(particles, adjacency);
+        fill_sparse(particles, particle_triangles(mesh.carved), surface, next_id);
+        keep.resize(particles.size(), 1);
+        particles.retain(keep);
     }
+    // Most of what fails is mended here, where its surroundings can still make room.
+    tetrahedralise(true, seconds);
+    FrameMesh mesh = carve_mesh(surface, seconds);
+    if (options.fit) fit_vertices(mesh, surface, seconds);
+    {
+        const StageTimer timer(seconds, "certify");
+        if (mend(mesh, inspect(mesh, surface, l, crossings), surface, l) == 0) return;
+    }
+    tetrahedralise(false, seconds);
+    const StageTimer timer(seconds, "relax");
+    frame.sweeps +=
+        relax(particles, vertex_adjacency(dt->cells(), particles.size()), surface, kMendingSweeps);
 }
 
 void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm,
@@ -397,7 +376,8 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
 TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion) {
     TrackedFrame frame;
     auto& seconds = frame.seconds;
-    frame.delaunay_strategy = name_of(UpdateStrategy::Rebuild);
+    frame.delaunay_strategy =
+        name_of(options.method == Method::Paper ? UpdateStrategy::Lazy : UpdateStrategy::Auto);
     const SizingLimits l = limits(surface);
     const std::vector<Id> before = particles.id;
     const bool warm = !particles.empty();
@@ -410,39 +390,34 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         const StageTimer timer(seconds, "cover");
         frame.seeded = cover(particles, surface, l, options.seed, next_id);
     }
+    const std::vector<Surface::Crossing> crossings = surface.crossings();
     if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
     else
-        sample(surface, l, warm, frame);
-    const std::vector<Surface::Crossing> crossings = surface.crossings();
-    const auto build_to_check = [&] {
-        Build built = build(surface, seconds);
+        sample(surface, l, crossings, warm, frame);
+    tetrahedralise(true, seconds);
+    FrameMesh mesh;
+    Inspection inspection;
+    for (int round = 0;; ++round) {
+        mesh = carve_mesh(surface, seconds);
+        if (options.fit) fit_vertices(mesh, surface, seconds);
         const StageTimer timer(seconds, "certify");
-        if (options.fit) undo_crossing_fits(built);
-        return built;
-    };
-    Build b = build_to_check();
-    const int certify_rounds = options.method == Method::Paper ? 0 : kCertifyRounds;
-    for (int round = 0; round < certify_rounds; ++round) {
-        std::size_t added = 0;
-        {
-            const StageTimer timer(seconds, "certify");
-            added = refine(b, surface, l, crossings);
-        }
-        if (added == 0) break;
-        if (round < kRelaxedCertifyRounds)
-            frame.sweeps += relax(particles, build(surface, seconds).adjacency, surface, 2);
-        b = build_to_check();
+        if (options.fit) undo_crossing_fits(mesh);
+        inspection = inspect(mesh, surface, l, crossings);
+        if (options.method == Method::Paper || round == kCertifyRounds ||
+            mend(mesh, inspection, surface, l) == 0)
+            break;
+        tetrahedralise(false, seconds);
     }
+    report(mesh, inspection, l, frame);
+    remove_specks(mesh, inspection);
+    inherit_velocities(particle_triangles(mesh.carved), first_new);
 
-    measure(b, surface, l, crossings, frame);
-    inherit_velocities(b.adjacency, first_new);
-
-    frame.mesh.points = b.vertices;
-    frame.mesh.triangles = b.carved.triangles;
+    frame.mesh.points = mesh.vertices;
+    frame.mesh.triangles = mesh.carved.triangles;
     std::vector<char> seen(particles.size(), 0);
-    for (std::size_t v = 0; v < b.vertices.size(); ++v) {
-        const int p = b.carved.particle[v];
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+        const int p = mesh.carved.particle[v];
         const bool own = p >= 0 && !seen[p];
         if (own) seen[p] = 1;
         frame.mesh.ids.push_back(own ? particles.id[p] : next_id++);

@@ -268,7 +268,8 @@ TEST_P(UpdateStrategies, EqualsAFreshBuildAfterAnyHistory) {
             for (int k = 0; k < 4; ++k) {
                 const int n = cells.neighbours[c][k];
                 if (n == static_cast<int>(c)) continue;
-                ASSERT_EQ(cells.neighbours[n][cells.mirror_index(static_cast<int>(c), k)], static_cast<int>(c));
+                ASSERT_EQ(cells.neighbours[n][cells.mirror_index(static_cast<int>(c), k)],
+                          static_cast<int>(c));
             }
         seen.resize(cells.size(), {-9, -9, -9, -9});
         for (const int c : dt->take_changed()) seen[c] = cells.vertices[c];

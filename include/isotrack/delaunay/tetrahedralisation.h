@@ -42,13 +42,13 @@ struct Tetrahedra {
 /// How a DT follows its points.
 enum class UpdateStrategy {
     Rebuild,  ///< Changes are only noted; `settle` builds anew.
-    Move,     ///< The paper's algorithm 3: a vertex moves in place when its star stays embedded and Delaunay, else
-              ///< it is inserted anew, then removed from where it was. Exact after every call.
-    Lazy,     ///< The paper's section 4.3: a vertex has a second position, in the DT, and follows its true one only
-              ///< when that has broken the embedding (score 2 each) or the Delaunay property (score 1) up to a score
-              ///< of 4.
-    Auto      ///< Changes are only noted; `settle` does what is predicted to be cheaper: relocate what moved, or
-              ///< build anew.
+    Move,     ///< The paper's algorithm 3: a vertex moves in place when its star stays embedded and Delaunay,
+           ///< else it is inserted anew, then removed from where it was. Exact after every call.
+    Lazy,  ///< The paper's section 4.3: a vertex has a second position, in the DT, and follows its true one
+           ///< only when that has broken the embedding (score 2 each) or the Delaunay property (score 1) up
+           ///< to a score of 4.
+    Auto  ///< Changes are only noted; `settle` does what is predicted to be cheaper: relocate what moved, or
+          ///< build anew.
 };
 const char* name_of(UpdateStrategy strategy);
 
@@ -77,15 +77,16 @@ public:
     virtual void move(int vertex, const Vec3& to) = 0;
     virtual void remove(int vertex) = 0;
 
-    /// The vertices that share an edge with `vertex`, in no particular but reproducible order; for the strategies that
-    /// only note changes as of the last `settle`.
+    /// The vertices that share an edge with `vertex`, in no particular but reproducible order; for the
+    /// strategies that only note changes as of the last `settle`.
     virtual void neighbours(int vertex, std::vector<int>& result) const = 0;
 
     /// Makes the DT that of the points where they are now.
     virtual void settle() = 0;
 
     /// The cells as of the last `settle`, none when the points span no volume. A vertex on the very place of
-    /// another belongs to no cell. A slot that lost its cell has only infinite vertices and is its own neighbour.
+    /// another belongs to no cell. A slot that lost its cell has only infinite vertices and is its own
+    /// neighbour.
     virtual const Tetrahedra& cells() = 0;
 
     /// The slots of `cells()` that were written since the last call.

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <vector>
 
+#include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/surface/surface.h"
 #include "isotrack/types.h"
 
@@ -24,6 +26,14 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps,
                                            double refine_above = std::numeric_limits<double>::infinity());
+
+/// Where to put a particle that mends a facet of the boundary between inside and outside: the point of the
+/// surface at the same distance from the facet's three vertices, on the dual edge between the circumcentres
+/// of its two cells. No particle is nearer to it than those three, so what is inserted there breaks the facet
+/// and leaves no short edge [Boissonnat, Oudot 2005]. nullopt where the dual does not cross the surface, as
+/// between two sheets. `facet`: the index of the vertex of `cell`, a finite inside cell, that is opposite.
+std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell,
+                                  int facet, Surface::Probe& probe);
 
 /// Distance of every lattice crossing of the surface to the nearest triangle that faces its way (unit normal
 /// . outward >= -0.2, since a crossed edge may lie nearly in the surface), so that one side of a thin sheet

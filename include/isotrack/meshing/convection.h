@@ -20,15 +20,18 @@ using CellLabels = std::vector<char>;
 /// the boundary of the labels themselves, whatever the order of the queue. So the labels are computed
 /// directly, in parallel:
 /// - a cell whose vertices all face the same way (every n_a . n_b >= 0) spans one sheet: it is inside when
-/// its circumcentre is, which is
-///   the rule of convection and of the restricted Delaunay triangulation, and is coherent among the slivers
-///   that lie on the sheet;
+///   its circumcentre is, which is the rule of convection and of the restricted Delaunay triangulation, and
+///   is coherent among the slivers that lie on the sheet;
 /// - any other cell spans two sheets, a thin solid or a gap, where the circumcentre may lie beyond the far
-/// sheet: it is inside when its
-///   centroid is.
+///   sheet: it is inside when its centroid is. So is a cell where the gradient is short, since sheets less
+///   than a voxel apart blur each other's normals.
 /// A cell too flat to have a circumcentre takes the label of the cell it flows to.
 CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& points,
                              const std::vector<Vec3>& normals, const Surface& surface);
+
+/// The same for the slots in `changed` alone, in `labels`, which grows to one entry per slot.
+void update_labels(CellLabels& labels, const std::vector<int>& changed, const Tetrahedra& cells,
+                   const std::vector<Vec3>& points, const std::vector<Vec3>& normals, const Surface& surface);
 
 /// The paper's reconstruction: the particles alone, from the hull inwards, by the exact oriented Gabriel
 /// test. Voids stay filled.

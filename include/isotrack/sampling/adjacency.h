@@ -19,6 +19,8 @@ struct Adjacency {
     };
     Range of(std::size_t i) const { return {adjacent.data() + first[i], adjacent.data() + first[i + 1]}; }
     std::size_t size() const { return first.size() - 1; }
+    /// Of the particles whose flag is set, renumbered as `Particles::retain` does.
+    Adjacency restricted(const std::vector<char>& keep) const;
 };
 
 /// The groups of a colouring in which no two neighbours have the same colour, so that the members of a group

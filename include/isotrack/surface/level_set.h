@@ -38,6 +38,7 @@ public:
     double resolution() const override;
     double reach() const override;
     Box bounds() const override;
+    Eigen::Affine3d lattice() const override;
     std::vector<Crossing> crossings() const override;
 
     /// True when there is no surface: no sign change between neighbouring voxels.

@@ -64,14 +64,17 @@ public:
     /// A box that holds the surface; empty when there is none.
     virtual Box bounds() const = 0;
 
-    /// Where a lattice edge crosses the surface.
+    /// From the whole numbers of a lattice of spacing `resolution()` to the world: the voxels of a grid.
+    virtual Eigen::Affine3d lattice() const;
+
+    /// Where an edge between neighbouring lattice nodes crosses the surface.
     struct Crossing {
         Vec3 point;               ///< Linearly interpolated along the edge.
         Eigen::Vector3f outward;  ///< Unit direction of the edge, from its end inside to its end outside.
     };
 
-    /// The crossings of a lattice of spacing `resolution()`: every part of the surface wider than a lattice
-    /// cell holds some. Always in the same order. This default scans `bounds()`.
+    /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
+    /// in the same order. This default scans `bounds()`.
     virtual std::vector<Crossing> crossings() const;
 };
 

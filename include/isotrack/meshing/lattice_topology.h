@@ -1,0 +1,28 @@
+// Whether a mesh has the topology that the signs at the lattice nodes have.
+#pragma once
+
+#include <vector>
+
+#include "isotrack/surface/surface.h"
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// How the topology of a mesh differs from that of the set of inside lattice nodes (26-connected; the outside
+/// is 6-connected), which is that of volumeToMesh.
+struct LatticeTopology {
+    /// Nodes on the wrong side of the mesh whose side matters. The other wrong nodes, within the tolerance,
+    /// can be put right one after the other, each a simple point, so that they change no component, handle or
+    /// void. World positions, in the order of the nodes.
+    std::vector<Vec3> faults;
+    /// Per triangle: it belongs to a component that holds no node on its own. No such thing is in a grid.
+    std::vector<char> speck;
+    bool has_specks = false;
+};
+
+/// The mesh must be closed. `crossings` are those of `surface`. Nodes count as on the side of the mesh that
+/// the lattice line in the third direction through them says.
+LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                 const Surface& surface, const std::vector<Surface::Crossing>& crossings);
+
+}  // namespace isotrack

@@ -1,0 +1,20 @@
+// Labels without edges and vertices at which the solid touches itself.
+#pragma once
+
+#include <vector>
+
+#include "isotrack/meshing/convection.h"
+#include "isotrack/surface/surface.h"
+
+namespace isotrack {
+
+/// Relabels cells around complex edges, those with four or more boundary facets, and around pinched vertices,
+/// where two sheets meet within less than the cells resolve: carved as they are, each would leave a handle or
+/// a piece on its own. The cells between two of the facets, or of one of the fans at the vertex, change
+/// sides, least certain first (by the value at their centroids, at most half a resolution), where that leaves
+/// fewer such edges and vertices than before. `pinched`: as found by `carve`, ascending. Deterministic.
+/// Returns whether a label changed.
+bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec3>& points,
+              const Surface& surface, const std::vector<int>& pinched);
+
+}  // namespace isotrack

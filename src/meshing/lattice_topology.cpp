@@ -1,0 +1,215 @@
+#include "isotrack/meshing/lattice_topology.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <numeric>
+#include <tuple>
+
+namespace isotrack {
+namespace {
+
+using Node = std::array<int, 3>;
+
+/// Where a lattice line in the third direction meets the mesh.
+struct Hit {
+    int x, y, component;
+    double z;  // lattice units
+};
+
+/// Triangles joined through common vertices. Components are numbered in the order of their first triangle.
+std::vector<int> component_of_triangles(std::size_t vertices, const std::vector<Triangle>& triangles,
+                                        int& count) {
+    std::vector<int> parent(vertices);
+    std::iota(parent.begin(), parent.end(), 0);
+    const auto find = [&](int v) {
+        while (parent[v] != v) v = parent[v] = parent[parent[v]];
+        return v;
+    };
+    for (const Triangle& t : triangles)
+        for (const int v : {t[1], t[2]}) parent[find(v)] = find(t[0]);
+    std::vector<int> number(vertices, -1), result;
+    count = 0;
+    for (const Triangle& t : triangles) {
+        int& n = number[find(t[0])];
+        if (n < 0) n = count++;
+        result.push_back(n);
+    }
+    return result;
+}
+
+/// The lines run a hair beside the nodes, so that they miss the vertices and edges of meshes that are aligned
+/// with the lattice.
+constexpr double kBeside[2] = {1.3e-7, 2.9e-7};
+
+/// Twice the signed area of pqr in the plane; of a shared edge pq both triangles get the same bits but for
+/// the sign.
+double area2(const Vec3& p, const Vec3& q, double x, double y) {
+    const bool swap = std::tie(p.x(), p.y(), p.z()) > std::tie(q.x(), q.y(), q.z());
+    const Vec3 &a = swap ? q : p, &b = swap ? p : q;
+    const double area = (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x());
+    return swap ? -area : area;
+}
+
+std::vector<Hit> hits_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                         const std::vector<int>& component) {
+    std::vector<Hit> hits;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]], &c = points[triangles[t][2]];
+        const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
+        for (int x = static_cast<int>(std::ceil(low.x() - kBeside[0])); x + kBeside[0] <= high.x(); ++x)
+            for (int y = static_cast<int>(std::ceil(low.y() - kBeside[1])); y + kBeside[1] <= high.y(); ++y) {
+                const double px = x + kBeside[0], py = y + kBeside[1];
+                const double wa = area2(b, c, px, py), wb = area2(c, a, px, py), wc = area2(a, b, px, py);
+                if (!((wa > 0.0 && wb > 0.0 && wc > 0.0) || (wa < 0.0 && wb < 0.0 && wc < 0.0))) continue;
+                hits.push_back({x, y, component[t], (wa * a.z() + wb * b.z() + wc * c.z()) / (wa + wb + wc)});
+            }
+    }
+    return hits;
+}
+
+/// Sets of a node's 26 neighbours as bits; bit 9 (x + 1) + 3 (y + 1) + z + 1, the node itself is bit 13.
+int bit_of(int x, int y, int z) {
+    return 9 * (x + 1) + 3 * (y + 1) + z + 1;
+}
+
+struct Neighbourhoods {
+    std::uint32_t touching[27] = {};  // neighbours that share a corner, an edge or a face
+    std::uint32_t beside[27] = {};    // neighbours that share a face
+    std::uint32_t all = 0, at_face = 0, no_corner = 0;
+    Neighbourhoods() {
+        const auto each = [](const auto& body) {
+            for (int x = -1; x <= 1; ++x)
+                for (int y = -1; y <= 1; ++y)
+                    for (int z = -1; z <= 1; ++z) body(x, y, z);
+        };
+        each([&](int x, int y, int z) {
+            const int i = bit_of(x, y, z), far = std::abs(x) + std::abs(y) + std::abs(z);
+            if (far == 0) return;
+            all |= 1u << i;
+            if (far == 1) at_face |= 1u << i;
+            if (far <= 2) no_corner |= 1u << i;
+            each([&](int u, int v, int w) {
+                const int dx = std::abs(u - x), dy = std::abs(v - y), dz = std::abs(w - z);
+                if ((u == 0 && v == 0 && w == 0) || std::max({dx, dy, dz}) != 1) return;
+                touching[i] |= 1u << bit_of(u, v, w);
+                if (dx + dy + dz == 1) beside[i] |= 1u << bit_of(u, v, w);
+            });
+        });
+    }
+};
+
+/// The bits of `set` that are connected with its bits in `seed`.
+std::uint32_t spread(std::uint32_t seed, std::uint32_t set, const std::uint32_t* near) {
+    std::uint32_t found = seed & set, rim = found;
+    while (rim != 0) {
+        std::uint32_t next = 0;
+        for (; rim != 0; rim &= rim - 1) next |= near[__builtin_ctz(rim)];
+        rim = next & set & ~found;
+        found |= rim;
+    }
+    return found;
+}
+
+/// Whether a node may change sides without changing the topology of either [Bertrand, Malandain 1994]: the
+/// inside around it is one 26-connected set, and the outside that reaches it through a face is one
+/// 6-connected set within its 18 nearest neighbours. `inside`: the neighbours that are inside.
+bool is_simple(std::uint32_t inside) {
+    static const Neighbourhoods around;
+    inside &= around.all;
+    const std::uint32_t outside = ~inside & around.no_corner, reached = outside & around.at_face;
+    if (inside == 0 || reached == 0) return false;
+    const auto lowest = [](std::uint32_t set) { return set & (~set + 1u); };
+    if (spread(lowest(inside), inside, around.touching) != inside) return false;
+    return (reached & ~spread(lowest(reached), outside, around.beside)) == 0;
+}
+
+}  // namespace
+
+LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                 const Surface& surface, const std::vector<Surface::Crossing>& crossings) {
+    const Eigen::Affine3d lattice = surface.lattice(), to_lattice = lattice.inverse();
+    std::vector<Vec3> in_lattice;
+    in_lattice.reserve(points.size());
+    for (const Vec3& p : points) in_lattice.push_back(to_lattice * p);
+    int components = 0;
+    const std::vector<int> component = component_of_triangles(points.size(), triangles, components);
+    std::vector<Hit> hits = hits_of(in_lattice, triangles, component);
+    LatticeTopology result;
+
+    // Components with a node between two hits of their own.
+    std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
+        return std::tie(a.component, a.x, a.y, a.z) < std::tie(b.component, b.x, b.y, b.z);
+    });
+    std::vector<char> holds_node(components, 0);
+    for (std::size_t h = 0; h + 1 < hits.size();) {
+        const Hit &a = hits[h], &b = hits[h + 1];
+        if (std::tie(a.component, a.x, a.y) != std::tie(b.component, b.x, b.y)) {
+            ++h;  // an odd hit: the line grazes an edge
+            continue;
+        }
+        if (std::floor(b.z) >= a.z) holds_node[a.component] = 1;
+        h += 2;
+    }
+    result.speck.resize(triangles.size());
+    for (std::size_t t = 0; t < triangles.size(); ++t) result.speck[t] = !holds_node[component[t]];
+    result.has_specks = std::count(holds_node.begin(), holds_node.end(), 0) > 0;
+
+    // Mesh and surface cross each line at places of their own; between two of them the nodes are on the wrong
+    // side.
+    hits.erase(
+        std::remove_if(hits.begin(), hits.end(), [&](const Hit& h) { return !holds_node[h.component]; }),
+        hits.end());
+    for (const auto& c : crossings) {
+        const Vec3 way = to_lattice.linear() * c.outward.cast<double>(), p = to_lattice * c.point;
+        if (std::abs(way.z()) < 0.5 * way.norm()) continue;
+        const double z = way.z() > 0.0 ? std::ceil(p.z()) - 0.5 : std::floor(p.z()) + 0.5;
+        hits.push_back({static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y())), 0, z});
+    }
+    std::sort(hits.begin(), hits.end(),
+              [](const Hit& a, const Hit& b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); });
+    const auto probe = surface.probe();
+    const auto is_inside = [&](const Node& n) {
+        return probe->value(lattice * Vec3(n[0], n[1], n[2])) < 0.0;
+    };
+    std::map<Node, bool> wrong;  // true: the mesh has it inside
+    for (std::size_t h = 0; h + 1 < hits.size();) {
+        const Hit &a = hits[h], &b = hits[h + 1];
+        if (std::tie(a.x, a.y) != std::tie(b.x, b.y)) {
+            ++h;
+            continue;
+        }
+        for (int z = static_cast<int>(std::ceil(a.z)); z <= b.z; ++z) {
+            const Node n = {a.x, a.y, z};
+            wrong[n] = !is_inside(n);
+        }
+        h += 2;
+    }
+    for (bool any = true; any;) {
+        any = false;
+        for (auto it = wrong.begin(); it != wrong.end();) {
+            const Node n = it->first;
+            std::uint32_t inside = 0;
+            for (int x = -1; x <= 1; ++x)
+                for (int y = -1; y <= 1; ++y)
+                    for (int z = -1; z <= 1; ++z) {
+                        const Node m = {n[0] + x, n[1] + y, n[2] + z};
+                        const auto found = wrong.find(m);
+                        if (found != wrong.end() ? found->second : is_inside(m))
+                            inside |= 1u << bit_of(x, y, z);
+                    }
+            if (is_simple(inside)) {
+                it = wrong.erase(it);
+                any = true;
+            } else {
+                ++it;
+            }
+        }
+    }
+    for (const auto& [n, by_mesh] : wrong) result.faults.push_back(lattice * Vec3(n[0], n[1], n[2]));
+    return result;
+}
+
+}  // namespace isotrack

@@ -1,0 +1,156 @@
+#include "tracking/inspection.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "isotrack/sampling/particle_grid.h"
+
+namespace isotrack {
+namespace {
+
+constexpr int kSteps = 6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
+constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's largest error is searched for
+constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
+constexpr double kLostAt = 3.0;      // tolerances
+constexpr double kFaultReach = 1.5;  // resolutions
+constexpr double kLeastAngle = 22.0 * 3.14159265358979323846 / 180.0;
+constexpr double kSmooth =
+    0.7;  // cosine between the normals of a triangle's corners, for its angles to matter
+constexpr double kAnglesFrom = 1.0;  // resolutions: longest edge of such a triangle
+
+struct Corners {
+    Triangle particle;
+    bool whole;  // no midpoint among them
+};
+
+Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
+    Corners result{{}, true};
+    for (int k = 0; k < 3; ++k) {
+        result.particle[k] = carved.particle[carved.triangles[triangle][k]];
+        result.whole = result.whole && result.particle[k] >= 0;
+    }
+    return result;
+}
+
+/// On smooth surface, not tiny, and with too small an angle.
+bool is_needle(const Particles& particles, const Triangle& t, double resolution) {
+    double smallest = kLeastAngle, longest = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        const int a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
+        const Vec3 u = particles.position[b] - particles.position[a],
+                   w = particles.position[c] - particles.position[a];
+        if (!(particles.normal[a].dot(particles.normal[b]) > kSmooth)) return false;
+        smallest = std::min(smallest, std::atan2(u.cross(w).norm(), u.dot(w)));
+        longest = std::max(longest, u.norm());
+    }
+    return smallest < kLeastAngle && longest > kAnglesFrom * resolution;
+}
+
+}  // namespace
+
+Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
+                   const std::vector<Surface::Crossing>& crossings) {
+    Inspection result;
+    result.errors =
+        triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSteps, kSuspect * limits.tolerance);
+    const auto distances =
+        crossing_distances(mesh.vertices, mesh.carved.triangles, crossings, kLostAt * limits.tolerance);
+    double sum = 0.0;
+    for (std::size_t c = 0; c < crossings.size(); ++c) {
+        if (!(distances[c] <= kCertified * limits.tolerance)) result.missed.push_back(crossings[c].point);
+        if (!std::isfinite(distances[c])) {
+            ++result.lost_crossings;
+            continue;
+        }
+        result.farthest_crossing = std::max(result.farthest_crossing, distances[c]);
+        sum += distances[c] * distances[c];
+    }
+    const std::size_t found = crossings.size() - result.lost_crossings;
+    if (found > 0) result.crossings_mean_square = sum / static_cast<double>(found);
+    result.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, surface, crossings);
+    if (result.topology.faults.empty()) return result;
+    const double near = kFaultReach * surface.resolution();
+    PointGrid faults(near);
+    for (const Vec3& f : result.topology.faults) faults.insert(f, 0);
+    for (const auto& c : crossings) {
+        bool doubtful = false;
+        faults.for_each_within(c.point, near, [&](int, double) { doubtful = true; });
+        if (doubtful) result.doubtful.push_back(c.point);
+    }
+    return result;
+}
+
+std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspection, const Tetrahedra& cells,
+                                const Particles& particles, const Surface& surface,
+                                const SizingLimits& limits) {
+    std::vector<Shortage> result;
+    const auto probe = surface.probe();
+    const CarvedSurface& carved = mesh.carved;
+    for (std::size_t t = 0; t < inspection.errors.size(); ++t) {
+        const bool too_far = inspection.errors[t].largest > kCertified * limits.tolerance;
+        const auto [corner, whole] = corners_of(carved, t);
+        if (!too_far && !(whole && is_needle(particles, corner, surface.resolution()))) continue;
+        const auto x = whole ? dual_crossing(cells, particles.position, carved.inside_cell[t],
+                                             carved.inside_facet[t], *probe)
+                             : std::nullopt;
+        if (x) {
+            result.push_back({*x, (*x - particles.position[corner[0]]).norm()});
+        } else if (too_far) {
+            double h = limits.max_edge;
+            for (const int p : corner)
+                if (p >= 0) h = std::min(h, particles.spacing[p]);
+            result.push_back({inspection.errors[t].where, 0.7 * h});
+        }
+    }
+    for (const Vec3& p : inspection.missed) result.push_back({p, 2.0 * surface.resolution()});
+    for (const Vec3& p : inspection.doubtful) result.push_back({p, surface.resolution()});
+    for (std::size_t e = 0; e + 1 < carved.complex_edge_ends.size(); e += 2) {
+        const int p = carved.complex_edge_ends[e], q = carved.complex_edge_ends[e + 1];
+        result.push_back({0.5 * (particles.position[p] + particles.position[q]),
+                          0.7 * std::min(particles.spacing[p], particles.spacing[q])});
+    }
+    return result;
+}
+
+void report(const FrameMesh& mesh, const Inspection& inspection, const SizingLimits& limits,
+            TrackedFrame& frame) {
+    double sum = 0.0, weight = 0.0;
+    frame.max_error = inspection.farthest_crossing;
+    for (std::size_t t = 0; t < inspection.errors.size(); ++t) {
+        const auto& [i, j, k] = mesh.carved.triangles[t];
+        const double area =
+            (mesh.vertices[j] - mesh.vertices[i]).cross(mesh.vertices[k] - mesh.vertices[i]).norm();
+        frame.max_error = std::max(frame.max_error, inspection.errors[t].largest);
+        sum += area * inspection.errors[t].mean_square;
+        weight += area;
+    }
+    frame.lost_crossings = inspection.lost_crossings;
+    frame.rms_error =
+        std::sqrt(std::max(weight > 0.0 ? sum / weight : 0.0, inspection.crossings_mean_square));
+    frame.within_tolerance = frame.max_error <= limits.tolerance && frame.lost_crossings == 0;
+}
+
+void remove_specks(FrameMesh& mesh, const Inspection& inspection) {
+    if (!inspection.topology.has_specks) return;
+    CarvedSurface& carved = mesh.carved;
+    std::vector<Triangle> kept;
+    for (std::size_t t = 0; t < carved.triangles.size(); ++t)
+        if (!inspection.topology.speck[t]) kept.push_back(carved.triangles[t]);
+    std::vector<int> number(mesh.vertices.size(), -1), particle;
+    for (const Triangle& t : kept)
+        for (const int v : t) number[v] = 0;
+    std::vector<Vec3> vertices;
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+        if (number[v] < 0) continue;
+        number[v] = static_cast<int>(vertices.size());
+        vertices.push_back(mesh.vertices[v]);
+        particle.push_back(carved.particle[v]);
+    }
+    for (Triangle& t : kept)
+        for (int& v : t) v = number[v];
+    mesh.vertices = std::move(vertices);
+    carved.triangles = std::move(kept);
+    carved.particle = std::move(particle);
+}
+
+}  // namespace isotrack
