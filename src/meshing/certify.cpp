@@ -95,7 +95,8 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
 
 std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell,
                                   int facet, Surface::Probe& probe) {
-    constexpr int kHalvings = 16;
+    constexpr int kMostHalvings = 60;
+    constexpr double kPrecision = 1e-7;  // of the facet's circumradius
     const auto centre_of = [&](int c, Vec3& centre) {
         const auto& v = cells.vertices[c];
         const Vec3& p = points[v[0]];
@@ -126,7 +127,8 @@ std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec
     const bool start_inside = value(start) < 0.0;
     double inside = start_inside ? start : low, outside = start_inside ? high : start;
     if (!(value(inside) < 0.0) || value(outside) < 0.0) return std::nullopt;
-    for (int halving = 0; halving < kHalvings; ++halving) {
+    const double close = kPrecision * to_middle.norm();
+    for (int halving = 0; halving < kMostHalvings && std::abs(outside - inside) > close; ++halving) {
         const double t = 0.5 * (inside + outside);
         (value(t) < 0.0 ? inside : outside) = t;
     }

@@ -44,6 +44,8 @@ std::vector<int> component_of_triangles(std::size_t vertices, const std::vector<
 /// with the lattice.
 constexpr double kBeside[2] = {1.3e-7, 2.9e-7};
 
+constexpr double kOnNode = 1e-6;  // lattice units
+
 /// Twice the signed area of pqr in the plane; of a shared edge pq both triangles get the same bits but for
 /// the sign.
 double area2(const Vec3& p, const Vec3& q, double x, double y) {
@@ -162,18 +164,23 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
     hits.erase(
         std::remove_if(hits.begin(), hits.end(), [&](const Hit& h) { return !holds_node[h.component]; }),
         hits.end());
-    for (const auto& c : crossings) {
-        const Vec3 way = to_lattice.linear() * c.outward.cast<double>(), p = to_lattice * c.point;
-        if (std::abs(way.z()) < 0.5 * way.norm()) continue;
-        const double z = way.z() > 0.0 ? std::ceil(p.z()) - 0.5 : std::floor(p.z()) + 0.5;
-        hits.push_back({static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y())), 0, z});
-    }
-    std::sort(hits.begin(), hits.end(),
-              [](const Hit& a, const Hit& b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); });
     const auto probe = surface.probe();
     const auto is_inside = [&](const Node& n) {
         return probe->value(lattice * Vec3(n[0], n[1], n[2])) < 0.0;
     };
+    for (const auto& c : crossings) {
+        const Vec3 way = to_lattice.linear() * c.outward.cast<double>(), p = to_lattice * c.point;
+        if (std::abs(way.z()) < 0.5 * way.norm()) continue;
+        const Node nearest = {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y())),
+                              static_cast<int>(std::lround(p.z()))};
+        // The crossing counts in the middle between its two nodes; on a node rounding decides which those
+        // are.
+        const double beyond = p.z() - nearest[2];
+        const bool up = std::abs(beyond) > kOnNode ? beyond > 0.0 : is_inside(nearest) == (way.z() > 0.0);
+        hits.push_back({nearest[0], nearest[1], 0, nearest[2] + (up ? 0.5 : -0.5)});
+    }
+    std::sort(hits.begin(), hits.end(),
+              [](const Hit& a, const Hit& b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); });
     std::map<Node, bool> wrong;  // true: the mesh has it inside
     for (std::size_t h = 0; h + 1 < hits.size();) {
         const Hit &a = hits[h], &b = hits[h + 1];

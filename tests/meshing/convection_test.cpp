@@ -19,6 +19,7 @@
 #include "isotrack/meshing/manifold.h"
 #include "isotrack/meshing/mesh_topology.h"
 #include "isotrack/meshing/self_intersections.h"
+#include "isotrack/meshing/untangle.h"
 #include "isotrack/sampling/cover.h"
 #include "isotrack/surface/shapes.h"
 #include "support/distance.h"
@@ -493,6 +494,92 @@ TEST(Fit, GivesTheSameBitsAtAnyThreadCount) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
     fit(one, mesh.triangles, mesh.points, *sphere, 3);
     EXPECT_EQ(many, one);
+}
+
+/// The boundary facets of labelled cells as (cell, facet).
+std::vector<std::pair<int, int>> boundary_facets(const Tetrahedra& cells, const CellLabels& labels) {
+    std::vector<std::pair<int, int>> facets;
+    for (std::size_t c = 0; c < cells.size(); ++c)
+        for (int k = 0; labels[c] && k < 4; ++k)
+            if (!labels[cells.neighbours[c][k]]) facets.emplace_back(c, k);
+    return facets;
+}
+
+TEST(DualCrossing, IsOnTheSurfaceAndNearestToTheFacetsOwnCorners) {
+    for (const auto& surface :
+         {shapes::sphere({0, 0, 0}, 1.0, 0.05), shapes::torus({0, 0, 0}, 1.0, 0.4, 0.05)}) {
+        const Samples s(*surface, 0.2);
+        const auto& points = s.particles.position;
+        const auto labels = guided_convection(s.cells, points, s.particles.normal, *surface);
+        const auto probe = surface->probe();
+        const auto facets = boundary_facets(s.cells, labels);
+        ASSERT_GT(facets.size(), 100u);
+        for (const auto& [cell, k] : facets) {
+            const auto x = dual_crossing(s.cells, points, cell, k, *probe);
+            ASSERT_TRUE(x);
+            EXPECT_NEAR(probe->value(*x), 0.0, 1e-4);
+            double own[3], least = 1e300;
+            for (int i = 0; i < 3; ++i)
+                own[i] = (points[s.cells.vertices[cell][Tetrahedra::kFacet[k][i]]] - *x).norm();
+            for (const Vec3& p : points) least = std::min(least, (p - *x).norm());
+            EXPECT_NEAR(own[0], own[1], 1e-9);
+            EXPECT_NEAR(own[0], own[2], 1e-9);
+            EXPECT_NEAR(own[0], least, 1e-9);
+        }
+    }
+}
+
+TEST(UpdateLabels, GivesWhatLabellingEverythingGives) {
+    const auto surface = shapes::torus({0, 0, 0}, 1.0, 0.4, 0.05);
+    Samples s(*surface, 0.3);
+    const auto dt = make_tetrahedralisation(UpdateStrategy::Auto);
+    dt->assign(s.particles.position);
+    CellLabels labels;
+    update_labels(labels, dt->take_changed(), dt->cells(), s.particles.position, s.particles.normal,
+                  *surface);
+    const auto probe = surface->probe();
+    for (int i = 0; i < 10; ++i) {
+        const Vec3 p = *probe->project(s.particles.position[7 * i] + Vec3(0.05, 0.04, 0.03));
+        s.particles.add(p, probe->normal(p), 0.3, 1000 + i);
+        dt->insert(p, 7 * i);
+    }
+    dt->settle();
+    const auto changed = dt->take_changed();
+    EXPECT_LT(changed.size(), dt->cells().size() / 2);
+    update_labels(labels, changed, dt->cells(), s.particles.position, s.particles.normal, *surface);
+    EXPECT_EQ(labels, guided_convection(dt->cells(), s.particles.position, s.particles.normal, *surface));
+}
+
+TEST(Untangle, LeavesFewerComplexEdgesAndPinchedVerticesAndNothingWhereThereWereNone) {
+    // Two balls a tenth of the spacing apart: the labels join them at some places and not at others.
+    std::size_t before = 0, after = 0;
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+        const auto surface = shapes::unite(
+            {shapes::sphere({-1.01, 0, 0}, 1.0, 0.25), shapes::sphere({1.01, 0, 0}, 1.0, 0.25)});
+        const Samples s(*surface, 0.4, seed);
+        const auto& points = s.particles.position;
+        CellLabels labels = guided_convection(s.cells, points, s.particles.normal, *surface);
+        CarvedSurface carved = carve(s.cells, labels, points);
+        const std::size_t count = carved.complex_edges + carved.pinched.size();
+        before += count;
+        const CellLabels untouched = labels;
+        for (int pass = 0; pass < 4 && untangle(labels, s.cells, points, *surface, carved.pinched); ++pass)
+            carved = carve(s.cells, labels, points);
+        if (count == 0) {
+            EXPECT_EQ(labels, untouched);
+        }
+        EXPECT_LE(carved.complex_edges + carved.pinched.size(), count);
+        after += carved.complex_edges + carved.pinched.size();
+        const auto probe = surface->probe();
+        for (std::size_t c = 0; c < labels.size(); ++c) {
+            if (labels[c] == untouched[c]) continue;
+            Vec3 centroid = Vec3::Zero();
+            for (const int v : s.cells.vertices[c]) centroid += 0.25 * points[v];
+            EXPECT_LE(std::abs(probe->value(centroid)), 0.5 * surface->resolution());
+        }
+    }
+    EXPECT_GT(before, 5u);
+    EXPECT_LT(after, before / 2);
 }
 
 }  // namespace

@@ -448,7 +448,7 @@ TEST(FillSparse, LeavesAGoodPackingAlone) {
     EXPECT_EQ(fill_sparse(particles, {}, *shapes::sphere({0, 0, 0}, 1.0, 0.1), next_id), 0u);
 }
 
-TEST(Densify, AddsWhereThereIsRoomShrinksWhereNotAndComesToAnEnd) {
+TEST(Densify, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
     const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
     Particles particles;
     particles.add({0, 0, 1}, {0, 0, 1}, 0.4, 0);
@@ -458,11 +458,25 @@ TEST(Densify, AddsWhereThereIsRoomShrinksWhereNotAndComesToAnEnd) {
     ASSERT_EQ(particles.size(), 2u);
     EXPECT_NEAR((particles.position[1] - Vec3(1, 0, 0)).norm(), 0.0, 1e-4);
     EXPECT_EQ(particles.id[1], 1);
-    // On the very place of the first: only its spacing can shrink, down to the smallest.
-    int calls = 0;
-    while (densify(particles, {{{0, 0, 1}, 0.4}}, *sphere, 0.05, next_id) > 0) ASSERT_LT(++calls, 20);
-    EXPECT_EQ(particles.size(), 2u);
-    EXPECT_DOUBLE_EQ(particles.spacing[0], 0.05);
+    // On the very place of the first: a ring of six around it, nearer at each call, down to the smallest
+    // spacing.
+    double ring = 0.4;
+    for (int calls = 0; calls < 20; ++calls) {
+        const std::size_t before = particles.size();
+        const std::size_t added = densify(particles, {{{0, 0, 1}, 0.4}}, *sphere, 0.05, next_id);
+        EXPECT_EQ(particles.size(), before + added);
+        if (added == 0) break;
+        ring *= 0.6;
+        EXPECT_EQ(added, 6u);
+        EXPECT_DOUBLE_EQ(particles.spacing[0], ring);
+        for (std::size_t i = before; i < particles.size(); ++i)
+            EXPECT_NEAR((particles.position[i] - Vec3(0, 0, 1)).norm(), ring, 0.1 * ring);
+    }
+    EXPECT_LT(0.6 * ring, 0.05);
+    EXPECT_GE(ring, 0.05);
+    for (std::size_t i = 0; i < particles.size(); ++i)
+        for (std::size_t j = 0; j < i; ++j)
+            EXPECT_GE((particles.position[i] - particles.position[j]).norm(), 0.7 * 0.05);
 }
 
 /// The DT, as the descent asks for it.

@@ -1,0 +1,103 @@
+// Meshes whose topology is known, held against the signs at the nodes of a lattice.
+#include "isotrack/meshing/lattice_topology.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "isotrack/surface/shapes.h"
+#include "support/meshes.h"
+
+namespace isotrack {
+namespace {
+
+using support::icosphere;
+using support::join;
+using support::torus;
+
+LatticeTopology topology_of(const TriangleMesh& mesh, const Surface& surface) {
+    return lattice_topology(mesh.points, mesh.triangles, surface, surface.crossings());
+}
+
+TEST(LatticeTopology, HasNoFaultsWhereOnlyNodesNearTheSurfaceAreOnTheWrongSide) {
+    const auto surface = shapes::sphere({0.03, 0.01, -0.02}, 1.0, 0.1);
+    for (const double radius : {0.93, 0.97, 1.0, 1.03, 1.07}) {
+        const LatticeTopology found = topology_of(icosphere(3, {0.03, 0.01, -0.02}, radius), *surface);
+        EXPECT_TRUE(found.faults.empty()) << radius;
+        EXPECT_FALSE(found.has_specks);
+    }
+}
+
+TEST(LatticeTopology, FindsAHandleTooManyAndOneTooFew) {
+    const auto ball = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const auto ring = shapes::torus({0, 0, 0}, 1.0, 0.4, 0.1);
+    EXPECT_FALSE(topology_of(torus(60, 30, 0.7, 0.3), *ball).faults.empty());
+    EXPECT_FALSE(topology_of(icosphere(3, {0, 0, 0}, 1.3), *ring).faults.empty());
+    EXPECT_TRUE(topology_of(torus(60, 30), *ring).faults.empty());
+}
+
+TEST(LatticeTopology, FindsABridgeInTheGapItCrosses) {
+    // Two balls with a gap of three nodes, and a mesh that is one long body over both.
+    const auto surface =
+        shapes::unite({shapes::sphere({-0.65, 0, 0}, 0.5, 0.1), shapes::sphere({0.65, 0, 0}, 0.5, 0.1)});
+    const TriangleMesh apart = join(icosphere(3, {-0.65, 0, 0}, 0.49), icosphere(3, {0.65, 0, 0}, 0.49));
+    EXPECT_TRUE(topology_of(apart, *surface).faults.empty());
+    TriangleMesh dumbbell = icosphere(5);
+    for (Vec3& p : dumbbell.points) {
+        const double x = 1.15 * p.x(), to_centre = std::abs(x) - 0.65, across = std::hypot(p.y(), p.z());
+        const double ball = std::sqrt(std::max(0.0, 0.25 - to_centre * to_centre));
+        const double rho = std::max(ball, to_centre < 0.0 ? 0.15 : 0.0) / std::max(across, 1e-9);
+        p = Vec3(x, rho * p.y(), rho * p.z());
+    }
+    const LatticeTopology found = topology_of(dumbbell, *surface);
+    ASSERT_FALSE(found.faults.empty());
+    for (const Vec3& f : found.faults) EXPECT_LT(std::abs(f.x()), 0.3);
+}
+
+TEST(LatticeTopology, FindsAComponentThatIsMissingAndOneThatIsTooMany) {
+    const auto one = shapes::sphere({0, 0, 0}, 0.5, 0.1);
+    const auto two = shapes::unite({one, shapes::sphere({1.5, 0, 0}, 0.3, 0.1)});
+    const TriangleMesh ball = icosphere(3, {0, 0, 0}, 0.5),
+                       balls = join(ball, icosphere(3, {1.5, 0, 0}, 0.3));
+    EXPECT_TRUE(topology_of(balls, *two).faults.empty());
+    const LatticeTopology missing = topology_of(ball, *two), extra = topology_of(balls, *one);
+    ASSERT_FALSE(missing.faults.empty());
+    for (const Vec3& f : missing.faults) EXPECT_LT((f - Vec3(1.5, 0, 0)).norm(), 0.3);
+    ASSERT_FALSE(extra.faults.empty());
+    for (const Vec3& f : extra.faults) EXPECT_LT((f - Vec3(1.5, 0, 0)).norm(), 0.3);
+}
+
+TEST(LatticeTopology, CallsAComponentWithoutANodeASpeck) {
+    const auto surface = shapes::sphere({0, 0, 0}, 0.5, 0.1);
+    const TriangleMesh ball = icosphere(3, {0, 0, 0}, 0.5);
+    const Eigen::Affine3d lattice = surface->lattice();
+    const Vec3 node = lattice * Vec3(1, 1, 1), between = lattice * Vec3(0.5, 0.5, 0.5);
+    const LatticeTopology speck = topology_of(join(ball, icosphere(1, between, 0.04)), *surface);
+    EXPECT_TRUE(speck.has_specks);
+    EXPECT_TRUE(speck.faults.empty());
+    ASSERT_EQ(speck.speck.size(), ball.triangles.size() + 80);
+    for (std::size_t t = 0; t < speck.speck.size(); ++t)
+        EXPECT_EQ(speck.speck[t], t >= ball.triangles.size());
+    const LatticeTopology island = topology_of(join(ball, icosphere(1, node, 0.04)), *surface);
+    EXPECT_FALSE(island.has_specks);
+    ASSERT_EQ(island.faults.size(), 1u);
+    EXPECT_LT((island.faults[0] - node).norm(), 1e-9);
+}
+
+TEST(LatticeTopology, HoldsForMeshesAlignedWithTheLattice) {
+    // Faces in the planes of the nodes: a node on the surface counts as outside, whichever way the mesh has
+    // it.
+    const auto surface = shapes::box({0, 0, 0}, {0.5, 0.4, 0.3}, 0.1);
+    TriangleMesh mesh;
+    for (int i = 0; i < 8; ++i)
+        mesh.points.emplace_back(i & 1 ? 0.5 : -0.5, i & 2 ? 0.4 : -0.4, i & 4 ? 0.3 : -0.3);
+    mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                      {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    const LatticeTopology found = topology_of(mesh, *surface);
+    EXPECT_TRUE(found.faults.empty());
+    EXPECT_FALSE(found.has_specks);
+}
+
+}  // namespace
+}  // namespace isotrack
