@@ -162,6 +162,12 @@ void add_mesh_command(CLI::App& app, int& result) {
                      "Convection guided by the level set, or of the particles alone")
         ->transform(CLI::CheckedTransformer(reconstructions).description(""))
         ->option_text("guided|pure [guided]");
+    const std::map<std::string, Border> borders{{"close", Border::Close}, {"open", Border::Open}};
+    mesh->add_option(
+            "--border", a->options.border,
+            "Where the surface runs into the border of its grid: close it by a flat cap, or leave it open")
+        ->transform(CLI::CheckedTransformer(borders).description(""))
+        ->option_text("close|open [close]");
     const std::map<std::string, OnError> on_error{{"skip", OnError::Skip}, {"stop", OnError::Stop}};
     mesh->add_option("--on-error", a->options.on_error, "After a frame that cannot be used: skip it or stop")
         ->transform(CLI::CheckedTransformer(on_error).description(""))

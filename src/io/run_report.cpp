@@ -43,6 +43,8 @@ Json to_object(const FrameReport& row) {
             {"min_angle_deg", number(row.min_angle_deg)},
             {"closed", row.closed},
             {"manifold", row.manifold},
+            {"opened", row.opened},
+            {"lost_crossings", row.lost_crossings},
             {"self_intersections", row.self_intersections},
             {"seconds", seconds},
             {"peak_memory_mb", number(row.peak_memory_mb)},

@@ -77,6 +77,7 @@ std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages
                     double min_spacing, Id& next_id) {
     constexpr double kApart = 0.7, kShrink = 0.6;
     constexpr int kAround = 6;
+    constexpr double kGoldenAngle = 2.399963;
     if (shortages.empty()) return 0;
     PointGrid grid(2.0 * surface.resolution());
     for (std::size_t i = 0; i < particles.size(); ++i)
@@ -114,8 +115,9 @@ std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages
         particles.spacing[there] = h;
         const Vec3 p = particles.position[there], a = particles.normal[there].unitOrthogonal(),
                    b = particles.normal[there].cross(a);
+        const double turn = kGoldenAngle * static_cast<double>(particles.size());  // rings do not line up
         for (int k = 0; k < kAround; ++k) {
-            const double angle = 2.0 * kPi * k / kAround;
+            const double angle = turn + 2.0 * kPi * k / kAround;
             add(p + h * (std::cos(angle) * a + std::sin(angle) * b), h);
         }
     }

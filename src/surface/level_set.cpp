@@ -314,10 +314,12 @@ struct LevelSet::Impl {
     double scale = 1.0;
     double reach = 0.0;
     std::size_t active_voxels = 0, border_crossings = 0;
+    openvdb::GridBase::ConstPtr source;  // as it came
     std::vector<Surface::Crossing> crossings;
     Box bounds;
 
-    Impl(const openvdb::GridBase::ConstPtr& source, const LevelSetOptions& options) : map(*source) {
+    Impl(const openvdb::GridBase::ConstPtr& as_it_came, const LevelSetOptions& options)
+        : map(*as_it_came), source(as_it_came) {
         const auto floats = openvdb::gridConstPtrCast<FloatGrid>(source);
         const auto doubles = openvdb::gridConstPtrCast<openvdb::DoubleGrid>(source);
         if (!floats && !doubles)
@@ -367,6 +369,12 @@ struct LevelSet::Impl {
             crossings.push_back({map.to_world(c.index()), outward.cast<float>()});
             bounds.extend(crossings.back().point);
         }
+    }
+
+    bool is_active(const Coord& c) const {
+        const auto floats = openvdb::gridConstPtrCast<FloatGrid>(source);
+        return floats ? floats->tree().isValueOn(c)
+                      : openvdb::gridConstPtrCast<openvdb::DoubleGrid>(source)->tree().isValueOn(c);
     }
 
     /// A float grid that can be sampled as it is, once its values are known to be world distances.
@@ -469,6 +477,15 @@ Eigen::Affine3d LevelSet::lattice() const {
     result.linear() = impl_->map.linear;
     result.translation() = impl_->map.shift;
     return result;
+}
+bool LevelSet::at_border(const Vec3& p) const {
+    if (impl_->border_crossings == 0) return false;
+    const Vec3 index = impl_->map.to_index(p);
+    const Coord low(openvdb::math::Floor(index.x()), openvdb::math::Floor(index.y()),
+                    openvdb::math::Floor(index.z()));
+    for (int corner = 0; corner < 8; ++corner)
+        if (!impl_->is_active(low.offsetBy(corner & 1, corner >> 1 & 1, corner >> 2))) return true;
+    return false;
 }
 std::vector<Surface::Crossing> LevelSet::crossings() const {
     return impl_->crossings;

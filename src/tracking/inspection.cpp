@@ -13,7 +13,8 @@ constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's 
 constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
 constexpr double kLostAt = 3.0;      // tolerances
 constexpr double kFaultReach = 1.5;  // resolutions
-constexpr double kLeastAngle = 22.0 * 3.14159265358979323846 / 180.0;
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+constexpr double kLeastAngle = 22.0 * kDegree, kLeastFittedAngle = 18.0 * kDegree;
 constexpr double kSmooth =
     0.7;  // cosine between the normals of a triangle's corners, for its angles to matter
 constexpr double kAnglesFrom = 1.0;  // resolutions: longest edge of such a triangle
@@ -32,18 +33,28 @@ Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
     return result;
 }
 
-/// On smooth surface, not tiny, and with too small an angle.
-bool is_needle(const Particles& particles, const Triangle& t, double resolution) {
-    double smallest = kLeastAngle, longest = 0.0;
-    for (int k = 0; k < 3; ++k) {
-        const int a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
-        const Vec3 u = particles.position[b] - particles.position[a],
-                   w = particles.position[c] - particles.position[a];
+double smallest_angle(const Vec3& p, const Vec3& q, const Vec3& r) {
+    const Vec3 u = q - p, v = r - q, w = p - r;
+    const double area2 = u.cross(v).norm();
+    return std::min(
+        {std::atan2(area2, -u.dot(w)), std::atan2(area2, -v.dot(u)), std::atan2(area2, -w.dot(v))});
+}
+
+/// On smooth surface, not tiny, and with too small an angle, before the fit or after it.
+bool is_needle(const FrameMesh& mesh, const Particles& particles, std::size_t triangle,
+               const Triangle& corner, double resolution) {
+    const auto& [i, j, k] = mesh.carved.triangles[triangle];
+    const auto& at = particles.position;
+    if (smallest_angle(at[corner[0]], at[corner[1]], at[corner[2]]) >= kLeastAngle &&
+        smallest_angle(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]) >= kLeastFittedAngle)
+        return false;
+    double longest = 0.0;
+    for (int e = 0; e < 3; ++e) {
+        const int a = corner[e], b = corner[(e + 1) % 3];
         if (!(particles.normal[a].dot(particles.normal[b]) > kSmooth)) return false;
-        smallest = std::min(smallest, std::atan2(u.cross(w).norm(), u.dot(w)));
-        longest = std::max(longest, u.norm());
+        longest = std::max(longest, (at[a] - at[b]).norm());
     }
-    return smallest < kLeastAngle && longest > kAnglesFrom * resolution;
+    return longest > kAnglesFrom * resolution;
 }
 
 }  // namespace
@@ -89,7 +100,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     for (std::size_t t = 0; t < inspection.errors.size(); ++t) {
         const bool too_far = inspection.errors[t].largest > kCertified * limits.tolerance;
         const auto [corner, whole] = corners_of(carved, t);
-        if (!too_far && !(whole && is_needle(particles, corner, surface.resolution()))) continue;
+        if (!too_far && !(whole && is_needle(mesh, particles, t, corner, surface.resolution()))) continue;
         const auto x = whole ? dual_crossing(cells, particles.position, carved.inside_cell[t],
                                              carved.inside_facet[t], *probe)
                              : std::nullopt;

@@ -89,6 +89,7 @@ TrackerOptions tracker_options(const MeshSequenceOptions& options, double voxel_
     if (options.max_edge) result.max_edge = options.max_edge->in_world(voxel_size);
     result.method = options.method;
     result.reconstruction = options.reconstruction;
+    result.border = options.border;
     result.fit = options.fit;
     result.seed = options.seed;
     return result;
@@ -146,6 +147,7 @@ std::map<std::string, std::string> effective_settings(const MeshSequenceOptions&
     s["max_edge"] = length(t.max_edge.value_or(40.0 * voxel_size));
     s["angle"] = std::to_string(std::lround(t.angle_deg.value_or(default_angle_deg(t.method)))) + " degrees";
     s["method"] = options.method == Method::Paper ? "paper" : "tolerance";
+    s["border"] = options.border == Border::Open ? "open" : "close";
     s["reconstruct"] = options.reconstruction == Reconstruction::Pure ? "pure" : "guided";
     s["fit"] = options.fit ? "on" : "off";
     s["seed"] = std::to_string(options.seed);
@@ -167,6 +169,8 @@ void describe(const TrackedFrame& tracked, const LevelSet& level_set, double tol
     row.euler = topology.euler;
     row.closed = topology.closed() && topology.oriented();
     row.manifold = topology.manifold();
+    row.opened = tracked.opened;
+    row.lost_crossings = tracked.lost_crossings;
     row.self_intersections = self_intersections(tracked.mesh).size();
     row.born = tracked.born;
     row.died = tracked.died;
@@ -341,7 +345,8 @@ int exit_code(const RunReport& report) {
     std::size_t good = 0, failed = 0;
     for (const FrameReport& row : report.frames) {
         if (row.status == "failed") ++failed;
-        if ((row.status == "ok" && row.closed && row.manifold && row.self_intersections == 0) ||
+        if ((row.status == "ok" && (row.closed || row.opened) && row.manifold &&
+             row.self_intersections == 0) ||
             row.status == "empty" || row.status == "skipped")
             ++good;
     }

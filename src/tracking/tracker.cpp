@@ -14,6 +14,7 @@
 #include "isotrack/meshing/convection.h"
 #include "isotrack/meshing/fit.h"
 #include "isotrack/meshing/manifold.h"
+#include "isotrack/meshing/open_border.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "isotrack/meshing/untangle.h"
 #include "isotrack/sampling/coordinate_descent.h"
@@ -422,6 +423,11 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         if (own) seen[p] = 1;
         frame.mesh.ids.push_back(own ? particles.id[p] : next_id++);
         frame.mesh.velocities.push_back(p >= 0 ? particles.velocity[p] : Vec3::Zero());
+    }
+    if (options.border == Border::Open) {
+        std::vector<char> at_border;
+        for (const Vec3& p : frame.mesh.points) at_border.push_back(surface.at_border(p));
+        frame.opened = open_border(frame.mesh, at_border, next_id) > 0;
     }
     frame.particles = particles.size();
     const std::unordered_set<Id> now(particles.id.begin(), particles.id.end());

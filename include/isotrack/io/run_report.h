@@ -26,6 +26,8 @@ struct FrameReport {
     double max_error_vx = 0.0, rms_error_vx = 0.0;  ///< Both ways, in voxels.
     double min_angle_deg = 0.0;
     bool closed = true, manifold = true;
+    bool opened = false;             ///< A cap was left out on purpose: the mesh is not closed there.
+    std::size_t lost_crossings = 0;  ///< Grid edges that cross surface which the mesh does not hold.
     std::size_t self_intersections = 0;
     std::map<std::string, double>
         seconds;  ///< read, carry, cover, size, relax, delaunay, convect, certify, fit, write, total.

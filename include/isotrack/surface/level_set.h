@@ -39,6 +39,10 @@ public:
     double reach() const override;
     Box bounds() const override;
     Eigen::Affine3d lattice() const override;
+    /// Whether the lattice cell around p has an inactive voxel of the grid as it came for a corner. A band is
+    /// at least a voxel wide on both sides of the surface, so there the surface leaves the active voxels: it
+    /// meets the border.
+    bool at_border(const Vec3& p) const override;
     std::vector<Crossing> crossings() const override;
 
     /// True when there is no surface: no sign change between neighbouring voxels.

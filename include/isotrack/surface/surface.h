@@ -64,6 +64,10 @@ public:
     /// A box that holds the surface; empty when there is none.
     virtual Box bounds() const = 0;
 
+    /// Whether a point of the surface is at the border of what is known, where the surface is closed by a
+    /// cap.
+    virtual bool at_border(const Vec3&) const { return false; }
+
     /// From the whole numbers of a lattice of spacing `resolution()` to the world: the voxels of a grid.
     virtual Eigen::Affine3d lattice() const;
 

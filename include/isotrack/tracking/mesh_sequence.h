@@ -36,6 +36,7 @@ struct MeshSequenceOptions {
     std::optional<Length> min_edge, max_edge;
     Method method = Method::Tolerance;
     Reconstruction reconstruction = Reconstruction::Guided;
+    Border border = Border::Close;
     bool fit = false;
     std::uint64_t seed = 1;
     std::optional<std::string> grid, velocity_grid;  ///< NAME or NAME[i]; unset: chosen by `choose_grid`.

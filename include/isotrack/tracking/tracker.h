@@ -25,6 +25,12 @@ enum class Reconstruction {
     Pure     ///< The geometric convection of the particles alone, as in the paper; for comparison.
 };
 
+/// What becomes of a surface that runs into the border of its grid.
+enum class Border {
+    Close,  ///< It is closed there by a flat cap.
+    Open    ///< The cap is left out of the mesh, see `open_border`; particles are on it all the same.
+};
+
 /// A bound that rarely matters beside a tolerance (60 degrees); what the whole spacing follows in the paper's
 /// method (20 degrees).
 double default_angle_deg(Method method);
@@ -38,6 +44,7 @@ struct TrackerOptions {
     std::optional<double> max_edge;   ///< Largest spacing. Unset: 40 times the surface's resolution.
     Method method = Method::Tolerance;
     Reconstruction reconstruction = Reconstruction::Guided;
+    Border border = Border::Close;
     bool fit = false;  ///< Vertices leave the surface so that the triangles are nearer to it; particles stay.
     std::uint64_t seed = 1;  ///< Same seed, same surfaces: same meshes, at any thread count.
 };
@@ -55,6 +62,7 @@ struct TrackedFrame {
     /// crossing), measured on `mesh`, world units; RMS likewise. Crossings farther than three tolerances from
     /// any triangle that faces their way are counted as lost instead.
     double max_error = 0.0, rms_error = 0.0;
+    bool opened = false;             ///< A cap was left out: the mesh has a border there.
     std::size_t lost_crossings = 0;  ///< Features below the grid's resolution that the mesh does not hold.
     bool within_tolerance = true;    ///< max_error is at most the tolerance and nothing is lost.
     std::map<std::string, double>
