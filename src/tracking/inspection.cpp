@@ -57,10 +57,9 @@ bool is_needle(const FrameMesh& mesh, const Particles& particles, std::size_t tr
     return longest > kAnglesFrom * resolution;
 }
 
-}  // namespace
-
-Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                   const std::vector<Surface::Crossing>& crossings) {
+/// Mesh to surface, and some crossings of the surface to the mesh.
+Inspection held_against(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
+                        const std::vector<Surface::Crossing>& crossings) {
     Inspection result;
     result.errors =
         triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSteps, kSuspect * limits.tolerance);
@@ -68,7 +67,7 @@ Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLi
         crossing_distances(mesh.vertices, mesh.carved.triangles, crossings, kLostAt * limits.tolerance);
     double sum = 0.0;
     for (std::size_t c = 0; c < crossings.size(); ++c) {
-        if (!(distances[c] <= kCertified * limits.tolerance)) result.missed.push_back(crossings[c].point);
+        if (!(distances[c] <= kCertified * limits.tolerance)) result.missed.push_back(crossings[c]);
         if (!std::isfinite(distances[c])) {
             ++result.lost_crossings;
             continue;
@@ -78,6 +77,19 @@ Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLi
     }
     const std::size_t found = crossings.size() - result.lost_crossings;
     if (found > 0) result.crossings_mean_square = sum / static_cast<double>(found);
+    return result;
+}
+
+}  // namespace
+
+Inspection inspect_again(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
+                         const Inspection& before) {
+    return held_against(mesh, surface, limits, before.missed);
+}
+
+Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
+                   const std::vector<Surface::Crossing>& crossings) {
+    Inspection result = held_against(mesh, surface, limits, crossings);
     result.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, surface, crossings);
     if (result.topology.faults.empty()) return result;
     const double near = kFaultReach * surface.resolution();
@@ -113,7 +125,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             result.push_back({inspection.errors[t].where, 0.7 * h});
         }
     }
-    for (const Vec3& p : inspection.missed) result.push_back({p, 2.0 * surface.resolution()});
+    for (const auto& c : inspection.missed) result.push_back({c.point, 2.0 * surface.resolution()});
     for (const Vec3& p : inspection.doubtful) result.push_back({p, surface.resolution()});
     for (std::size_t e = 0; e + 1 < carved.complex_edge_ends.size(); e += 2) {
         const int p = carved.complex_edge_ends[e], q = carved.complex_edge_ends[e + 1];

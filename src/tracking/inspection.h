@@ -20,8 +20,8 @@ struct FrameMesh {
 };
 
 struct Inspection {
-    std::vector<TriangleError> errors;  ///< Per triangle.
-    std::vector<Vec3> missed;           ///< Crossings farther from the mesh than the tolerance.
+    std::vector<TriangleError> errors;      ///< Per triangle.
+    std::vector<Surface::Crossing> missed;  ///< Crossings farther from the mesh than the tolerance.
     double farthest_crossing = 0.0, crossings_mean_square = 0.0;  ///< Of those that were found.
     std::size_t lost_crossings = 0;                               ///< Those that were not.
     LatticeTopology topology;
@@ -31,6 +31,10 @@ struct Inspection {
 /// Both ways, and the topology.
 Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
                    const std::vector<Surface::Crossing>& crossings);
+
+/// Mesh to surface, and the crossings that `before` missed.
+Inspection inspect_again(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
+                         const Inspection& before);
 
 /// Where particles are missing: at the dual crossings of triangles with too large an error or, where the
 /// surface is smooth, too small an angle; at crossings that are missed; around nodes whose side is wrong; on

@@ -399,15 +399,25 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
     tetrahedralise(true, seconds);
     FrameMesh mesh;
     Inspection inspection;
+    // Rounds look at the triangles and what was missed before; only a mesh that passes so, or the last, is
+    // held against the whole surface.
+    bool whole = true;
     for (int round = 0;; ++round) {
         mesh = carve_mesh(surface, seconds);
         if (options.fit) fit_vertices(mesh, surface, seconds);
         const StageTimer timer(seconds, "certify");
         if (options.fit) undo_crossing_fits(mesh);
+        const bool last = options.method == Method::Paper || round == kCertifyRounds;
+        if (!whole && !last) {
+            inspection = inspect_again(mesh, surface, l, inspection);
+            if (mend(mesh, inspection, surface, l) > 0) {
+                tetrahedralise(false, seconds);
+                continue;
+            }
+        }
         inspection = inspect(mesh, surface, l, crossings);
-        if (options.method == Method::Paper || round == kCertifyRounds ||
-            mend(mesh, inspection, surface, l) == 0)
-            break;
+        if (last || mend(mesh, inspection, surface, l) == 0) break;
+        whole = false;
         tetrahedralise(false, seconds);
     }
     report(mesh, inspection, l, frame);
