@@ -1,24 +1,7 @@
 #!/usr/bin/env bash
 # isotrack check and isotrack compare as a user runs them: what they print and how they exit.
 # usage: check_and_compare.sh PROGRAM
-set -u
-program=$1
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-cd "$folder" || exit 1
-failures=0
-
-# expect CODE PATTERN COMMAND...: the exit code, and a pattern in what comes out on both streams
-expect() {
-    local code=$1 pattern=$2 output got
-    shift 2
-    output=$("$@" 2>&1)
-    got=$?
-    if [ "$got" -ne "$code" ] || ! grep -qE -- "$pattern" <<<"$output"; then
-        printf 'expected exit %s and "%s", got exit %s from: %s\n%s\n' "$code" "$pattern" "$got" "$*" "$output"
-        failures=$((failures + 1))
-    fi
-}
+. "$(dirname "${BASH_SOURCE[0]}")/support.sh"
 
 # A tetrahedron of the given triangles.
 tetrahedron() { printf '%s\n' OFF "4 $# 0" '0 0 0' '1 0 0' '0 1 0' '0 0 1' "${@/#/3 }"; }

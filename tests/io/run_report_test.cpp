@@ -57,6 +57,8 @@ TEST(RunReport, GivesEveryFieldOfARowInOrder) {
                                                "min_angle_deg",
                                                "closed",
                                                "manifold",
+                                               "opened",
+                                               "lost_crossings",
                                                "self_intersections",
                                                "seconds",
                                                "peak_memory_mb",
