@@ -243,11 +243,14 @@ double slope_at_surface(const FloatTree& tree, const AffineMap& map,
 }
 
 /// World units per grid unit for a measured slope: exact where the unit is recognised.
-double value_scale_for(double slope, double voxel_size) {
-    constexpr double kRecognised = 0.25;
-    if (!(slope > 0.0) || std::abs(slope - 1.0) < kRecognised) return 1.0;
-    if (std::abs(slope * voxel_size - 1.0) < kRecognised) return voxel_size;
-    return 1.0 / slope;
+double value_scale_for(double slope, double voxel_size, bool level_set) {
+    // Central differences across sheets of a voxel or two are too short: what says it holds distances is believed
+    // for longer.
+    const double recognised = std::log(level_set ? 2.5 : 1.25);
+    if (!(slope > 0.0)) return 1.0;
+    const double off_world = std::abs(std::log(slope)), off_voxels = std::abs(std::log(slope * voxel_size));
+    if (std::min(off_world, off_voxels) > recognised) return 1.0 / slope;
+    return off_world <= off_voxels ? 1.0 : voxel_size;
 }
 
 /// A float copy with `sign * (value - iso)`, active tiles turned into voxels, and no value that is not
@@ -352,7 +355,8 @@ struct LevelSet::Impl {
                 grid_label(*source) + " is not a level set: its values do not change sign around " +
                 std::to_string(options.iso) + " (class '" + openvdb::GridBase::gridClassToString(grid_class) +
                 "'); give an iso value inside its range");
-        scale = value_scale_for(slope_at_surface(grid->constTree(), map, found), map.voxel_size);
+        scale = value_scale_for(slope_at_surface(grid->constTree(), map, found), map.voxel_size,
+                                grid_class == openvdb::GRID_LEVEL_SET);
         border_crossings = static_cast<std::size_t>(
             std::count_if(found.begin(), found.end(), [](const auto& c) { return c.at_border; }));
 

@@ -586,5 +586,24 @@ TEST(LevelSetOfRealFiles, PutsLiquidWhereVolumeToMeshDoes) {
     }
 }
 
+TEST(LevelSet, TakesTheDistancesOfAThinShellForWhatTheyAre) {
+    // A wall of one voxel: central differences across it are about half as long as the gradient.
+    const double voxel = 0.05;
+    for (const double unit : {1.0, voxel}) {
+        const auto grid = openvdb::FloatGrid::create(static_cast<float>(3.0 * voxel / unit));
+        grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
+        grid->setGridClass(openvdb::GRID_LEVEL_SET);
+        auto access = grid->getAccessor();
+        for (int x = -20; x <= 20; ++x)
+            for (int y = -20; y <= 20; ++y)
+                for (int z = -20; z <= 20; ++z) {
+                    const double r = voxel * std::sqrt(double(x * x + y * y + z * z));
+                    const double value = std::abs(r - 0.6) - 0.5 * voxel;
+                    if (value < 3.0 * voxel) access.setValue({x, y, z}, static_cast<float>(value / unit));
+                }
+        EXPECT_DOUBLE_EQ(LevelSet(grid).value_scale(), unit);
+    }
+}
+
 }  // namespace
 }  // namespace isotrack
