@@ -35,7 +35,7 @@ constexpr int kFitSteps = 4;
 constexpr int kUntanglingPasses = 4;
 constexpr double kAngleFloor = 2.0;  // resolutions: sharp edges are as round as the grid makes them
 constexpr double kLeastSpacing =
-    0.05;  // resolutions: for shreds of a single voxel, where nothing coarser closes
+    0.02;  // resolutions: for shreds of a single voxel, where nothing coarser closes
 
 /// Adds the time from its construction to its destruction to a stage.
 class StageTimer {
