@@ -30,7 +30,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3, kMendingSweeps = 2;
-constexpr int kCertifyRounds = 12;
+constexpr int kCertifyRounds = 24;
 constexpr int kFitSteps = 4;
 constexpr int kUntanglingPasses = 4;
 constexpr double kAngleFloor = 2.0;  // resolutions: sharp edges are as round as the grid makes them
