@@ -3,8 +3,10 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <memory>
 
@@ -16,7 +18,11 @@ namespace {
 constexpr int kLattice = 3;
 constexpr double kWeight[3] = {54.0, 9.0, 4.0};  // in the middle, on an edge, in a corner
 
+constexpr double kRelaxation = 1.5;   // the shares of the neighbours make each step too short
 constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
+constexpr double kDamping = 0.02;     // of the quadric's trace: how freely a vertex slides along the surface
+constexpr double kLeastAngle = 3.14159265358979323846 / 6.0;
+constexpr int kHalvings = 2;  // of the steps around a spoilt triangle, before they are taken back
 
 /// The triangles around each vertex: those of v are entries first[v] to first[v + 1] - 1, as 3 * triangle +
 /// corner.
@@ -33,56 +39,112 @@ struct Corners {
     }
 };
 
+/// A triangle's share in the normal equations of its corners.
+struct Shares {
+    Vec3 normal = Vec3::Zero();
+    std::array<double, 3> value{}, weight{};
+};
+
+Shares shares_of(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
+    Shares result;
+    const Vec3 cross = (b - a).cross(c - a);
+    const double area2 = cross.norm();
+    if (!(area2 > 0.0)) return result;
+    result.normal = cross / area2;
+    for (int i = 0; i <= kLattice; ++i)
+        for (int j = 0; i + j <= kLattice; ++j) {
+            const double u = static_cast<double>(i) / kLattice, v = static_cast<double>(j) / kLattice;
+            const double w[3] = {1.0 - u - v, u, v};
+            const int zeros = (i == 0) + (j == 0) + (i + j == kLattice);
+            const double share = area2 * kWeight[zeros];
+            const double value = probe.value(w[0] * a + w[1] * b + w[2] * c);
+            for (int k = 0; k < 3; ++k) {
+                result.value[k] += share * w[k] * value;
+                result.weight[k] += share * w[k];
+            }
+        }
+    return result;
+}
+
+double smallest_angle(const Vec3& p, const Vec3& q, const Vec3& r) {
+    const Vec3 u = q - p, v = r - q, w = p - r;
+    // The smallest angle has the largest cotangent; all share the area.
+    const double area2 = u.cross(v).norm();
+    return std::atan2(area2, std::max({-u.dot(w), -v.dot(u), -w.dot(v)}));
+}
+
+/// Whether a triangle turns over by these steps, or gets too sharp and sharper than it was.
+bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const Vec3& b_to,
+            const Vec3& c_to) {
+    const Vec3 area = (b - a).cross(c - a);
+    if (area == Vec3::Zero()) return false;
+    if (!(area.dot((b_to - a_to).cross(c_to - a_to)) > 0.0)) return true;
+    const double angle = smallest_angle(a_to, b_to, c_to);
+    return angle < kLeastAngle && angle < smallest_angle(a, b, c);
+}
+
 }  // namespace
 
-void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-         const std::vector<Vec3>& normals, const Surface& surface, int steps) {
+void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, const Surface& surface,
+         int steps) {
     const Corners corners(vertices.size(), triangles);
-    std::vector<double> limit(vertices.size(), std::numeric_limits<double>::infinity());
-    for (const Triangle& t : triangles)
-        for (int k = 0; k < 3; ++k) {
-            const double edge = kLargestStep * (vertices[t[k]] - vertices[t[(k + 1) % 3]]).norm();
-            for (const int end : {t[k], t[(k + 1) % 3]}) limit[end] = std::min(limit[end], edge);
-        }
-    struct Share {
-        double value, weight;
+    const auto for_each_vertex = [&](const auto& body) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices.size(), 256), [&](const auto& range) {
+            for (std::size_t v = range.begin(); v < range.end(); ++v) body(v);
+        });
     };
-    std::vector<std::array<Share, 3>> shares(triangles.size());
+    const auto for_each_triangle = [&](const auto& body) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
+            for (std::size_t t = range.begin(); t < range.end(); ++t) body(t);
+        });
+    };
+
+    std::vector<Shares> shares(triangles.size());
+    std::vector<char> bad(triangles.size());
+    std::vector<Vec3> to(vertices.size());
     tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
     for (int step = 0; step < steps; ++step) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
             Surface::Probe& probe = *probes.local();
-            for (std::size_t t = range.begin(); t < range.end(); ++t) {
-                const Vec3 &a = vertices[triangles[t][0]], &b = vertices[triangles[t][1]],
-                           &c = vertices[triangles[t][2]];
-                const double area = (b - a).cross(c - a).norm();
-                shares[t] = {};
-                for (int i = 0; i <= kLattice; ++i)
-                    for (int j = 0; i + j <= kLattice; ++j) {
-                        const double u = static_cast<double>(i) / kLattice,
-                                     v = static_cast<double>(j) / kLattice;
-                        const double w[3] = {1.0 - u - v, u, v};
-                        const int zeros = (i == 0) + (j == 0) + (i + j == kLattice);
-                        const double share = area * kWeight[zeros];
-                        const double value = probe.value(w[0] * a + w[1] * b + w[2] * c);
-                        for (int k = 0; k < 3; ++k) {
-                            shares[t][k].value += share * w[k] * value;
-                            shares[t][k].weight += share * w[k];
-                        }
-                    }
-            }
+            for (std::size_t t = range.begin(); t < range.end(); ++t)
+                shares[t] = shares_of(vertices[triangles[t][0]], vertices[triangles[t][1]],
+                                      vertices[triangles[t][2]], probe);
         });
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices.size(), 512), [&](const auto& range) {
-            for (std::size_t v = range.begin(); v < range.end(); ++v) {
-                double value = 0.0, weight = 0.0;
-                for (int e = corners.first[v]; e < corners.first[v + 1]; ++e) {
-                    const Share& s = shares[corners.corner[e] / 3][corners.corner[e] % 3];
-                    value += s.value;
-                    weight += s.weight;
-                }
-                if (weight > 0.0) vertices[v] -= std::clamp(value / weight, -limit[v], limit[v]) * normals[v];
+        for_each_vertex([&](std::size_t v) {
+            Mat3 quadric = Mat3::Zero();
+            Vec3 pull = Vec3::Zero();
+            double shortest2 = std::numeric_limits<double>::infinity();
+            for (int e = corners.first[v]; e < corners.first[v + 1]; ++e) {
+                const int t = corners.corner[e] / 3, k = corners.corner[e] % 3;
+                const Shares& s = shares[t];
+                quadric += s.weight[k] * s.normal * s.normal.transpose();
+                pull += s.value[k] * s.normal;
+                for (const int other : {triangles[t][(k + 1) % 3], triangles[t][(k + 2) % 3]})
+                    shortest2 = std::min(shortest2, (vertices[other] - vertices[v]).squaredNorm());
             }
+            to[v] = vertices[v];
+            const double trace = quadric.trace();
+            if (!(trace > 0.0)) return;
+            quadric.diagonal().array() += kDamping * trace;
+            Vec3 move = -kRelaxation * quadric.ldlt().solve(pull);
+            const double length = move.norm(), limit = kLargestStep * std::sqrt(shortest2);
+            if (length > limit) move *= limit / length;
+            to[v] += move;
         });
+        for (int pass = 0;; ++pass) {
+            for_each_triangle([&](std::size_t t) {
+                const auto& [i, j, k] = triangles[t];
+                bad[t] = spoilt(vertices[i], vertices[j], vertices[k], to[i], to[j], to[k]);
+            });
+            if (std::find(bad.begin(), bad.end(), 1) == bad.end()) break;
+            for_each_vertex([&](std::size_t v) {
+                bool back = false;
+                for (int e = corners.first[v]; e < corners.first[v + 1] && !back; ++e)
+                    back = bad[corners.corner[e] / 3];
+                if (back) to[v] = pass < kHalvings ? Vec3(0.5 * (vertices[v] + to[v])) : vertices[v];
+            });
+        }
+        vertices.swap(to);
     }
 }
 

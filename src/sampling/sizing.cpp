@@ -36,6 +36,13 @@ void limit_gradation(Particles& particles, const Adjacency& adjacency) {
     }
 }
 
+/// The spacing that a quarter of the particles are below.
+double lower_quartile(std::vector<double> spacing) {
+    const auto quartile = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 4);
+    std::nth_element(spacing.begin(), quartile, spacing.end());
+    return *quartile;
+}
+
 double bounded(double h, const SizingLimits& limits) {
     return std::clamp(h, limits.min_edge, limits.max_edge);
 }
@@ -72,10 +79,14 @@ double normal_deviation(const Particles& particles, const Adjacency& adjacency, 
 void update_spacing(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence,
                     const SizingLimits& limits) {
     const std::size_t n = particles.size();
+    if (n == 0) return;
+    const double wide = lower_quartile(particles.spacing);
     std::vector<double> log_k2(n);
     for_each_particle(n, [&](std::size_t i) {
         const double h = particles.spacing[i], e = evidence.error[i];
-        const double factor = e < 0.0 ? 1.0 : std::clamp(e / (kShare * limits.tolerance), 0.5, 2.0);
+        const double aim =
+            kShare * limits.tolerance * std::min(1.0, std::pow(wide / h, limits.wide_exponent));
+        const double factor = e < 0.0 ? 1.0 : std::clamp(e / aim, 0.5, 2.0);
         log_k2[i] = std::log(factor / (h * h));
     });
     std::vector<double> next(n);

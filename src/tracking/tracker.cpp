@@ -31,7 +31,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3, kMendingSweeps = 2;
 constexpr int kCertifyRounds = 24;
-constexpr int kFitSteps = 4;
+constexpr int kFitSteps = 6;
+constexpr double kFitWideExponent = 0.5;
 constexpr int kUntanglingPasses = 4;
 constexpr double kAngleFloor = 2.0;  // resolutions: sharp edges are as round as the grid makes them
 constexpr double kLeastSpacing =
@@ -125,6 +126,7 @@ struct Tracker::Impl {
         l.angle_floor = kAngleFloor * surface.resolution();
         l.min_edge = options.min_edge.value_or(0.5 * surface.resolution());
         l.max_edge = std::max(options.max_edge.value_or(40.0 * surface.resolution()), l.min_edge);
+        l.wide_exponent = options.fit ? kFitWideExponent : 0.0;
         return l;
     }
 
@@ -233,13 +235,7 @@ struct Tracker::Impl {
 
     void fit_vertices(FrameMesh& mesh, const Surface& surface, std::map<std::string, double>& seconds) {
         const StageTimer timer(seconds, "fit");
-        const auto probe = surface.probe();
-        std::vector<Vec3> normals;
-        for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-            const int p = mesh.carved.particle[v];
-            normals.push_back(p >= 0 ? particles.normal[p] : probe->normal(mesh.vertices[v]));
-        }
-        fit(mesh.vertices, mesh.carved.triangles, normals, surface, kFitSteps);
+        fit(mesh.vertices, mesh.carved.triangles, surface, kFitSteps);
         for (Vec3& v : mesh.vertices) v = v.cast<float>().cast<double>();
     }
 

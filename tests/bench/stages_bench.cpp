@@ -57,7 +57,6 @@ struct Scene {
     Tetrahedra cells;
     CarvedSurface carved;
     TriangleMesh mesh;
-    std::vector<Vec3> normals;  ///< Of the mesh's vertices.
     std::vector<Surface::Crossing> crossings;
 };
 
@@ -86,11 +85,8 @@ Scene make_scene(const std::string& shape, std::size_t count) {
         carve(s.cells, guided_convection(s.cells, s.particles.position, s.particles.normal, *s.surface),
               s.particles.position);
     std::size_t midpoint = 0;
-    const auto probe = s.surface->probe();
-    for (const int p : s.carved.particle) {
+    for (const int p : s.carved.particle)
         s.mesh.points.push_back(p >= 0 ? s.particles.position[p] : s.carved.midpoints[midpoint++]);
-        s.normals.push_back(probe->normal(s.mesh.points.back()));
-    }
     s.mesh.triangles = s.carved.triangles;
     s.crossings = s.surface->crossings();
     return s;
@@ -221,13 +217,13 @@ void distances(benchmark::State& state, const Scene& s) {
 }
 
 void fit_vertices(benchmark::State& state, const Scene& s) {
-    constexpr int kSteps = 4;
+    constexpr int kSteps = 6;
     std::vector<Vec3> vertices;
     for (auto _ : state) {
         state.PauseTiming();
         vertices = s.mesh.points;
         state.ResumeTiming();
-        fit(vertices, s.mesh.triangles, s.normals, *s.surface, kSteps);
+        fit(vertices, s.mesh.triangles, *s.surface, kSteps);
     }
     count_items(state, s.mesh.triangles.size());
     const auto rms = [&](const std::vector<Vec3>& points) {

@@ -8,13 +8,16 @@
 
 namespace isotrack {
 
-/// Vertices on a convex surface leave every triangle inside of it. `fit` moves the vertices along `normals`
-/// (unit, outward, one per vertex) so that the signed error averages out over the triangles around each:
-/// `steps` Jacobi steps, each by minus the mean of the surface's value at ten points of each triangle,
-/// weighted by area and barycentric coordinate. A step is at most a tenth of the shortest edge around the
-/// vertex, so that no triangle turns over at once. Connectivity stays. Uses TBB inside; same result at any
-/// thread count.
-void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-         const std::vector<Vec3>& normals, const Surface& surface, int steps);
+/// Vertices on a convex surface leave every triangle inside of it. `fit` moves them where the squared
+/// distance between triangles and surface is least: `steps` damped Gauss-Newton steps on the surface's value
+/// at ten points of each triangle, with the facets' normals for its gradient, so that each vertex solves a
+/// quadric of its own [after Garland, Heckbert 1997]. Where facets around a vertex agree it moves along their
+/// normal; where they do not, into the edge or corner that they make.
+///
+/// A step is at most a tenth of the shortest edge around the vertex. No triangle turns over, and none gets a
+/// smallest angle below 30 degrees unless it had one; then it gets no smaller. Connectivity stays; triangles
+/// far apart along the mesh may come to cross. Uses TBB inside; same result at any thread count.
+void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, const Surface& surface,
+         int steps);
 
 }  // namespace isotrack
