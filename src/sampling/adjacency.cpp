@@ -1,6 +1,8 @@
 #include "isotrack/sampling/adjacency.h"
 
+#include <algorithm>
 #include <cstdint>
+#include <utility>
 
 namespace isotrack {
 
@@ -12,8 +14,95 @@ Adjacency Adjacency::restricted(const std::vector<char>& keep) const {
     Adjacency result;
     for (std::size_t i = 0; i < size(); ++i) {
         if (!keep[i]) continue;
-        for (const int j : of(i))
-            if (keep[j]) result.adjacent.push_back(number[j]);
+        const std::size_t start = result.adjacent.size();
+        bool bridged = false;
+        for (const int j : of(i)) {
+            if (keep[j]) {
+                result.adjacent.push_back(number[j]);
+                continue;
+            }
+            bridged = true;
+            for (const int k : of(j))
+                if (keep[k] && k != static_cast<int>(i)) result.adjacent.push_back(number[k]);
+        }
+        if (bridged) {
+            const auto from = result.adjacent.begin() + static_cast<std::ptrdiff_t>(start);
+            std::sort(from, result.adjacent.end());
+            result.adjacent.erase(std::unique(from, result.adjacent.end()), result.adjacent.end());
+        }
+        result.first.push_back(static_cast<int>(result.adjacent.size()));
+    }
+    return result;
+}
+
+namespace {
+
+/// From directed pairs, which may repeat.
+Adjacency from_pairs(const std::vector<std::pair<int, int>>& pairs, std::size_t count) {
+    std::vector<int> first(count + 1, 0);
+    for (const auto& p : pairs) ++first[p.first + 1];
+    for (std::size_t i = 0; i < count; ++i) first[i + 1] += first[i];
+    std::vector<int> second(pairs.size()), end(first.begin(), first.end() - 1);
+    for (const auto& p : pairs) second[end[p.first]++] = p.second;
+    Adjacency result;
+    result.first.reserve(count + 1);
+    for (std::size_t i = 0; i < count; ++i) {
+        std::sort(second.begin() + first[i], second.begin() + end[i]);
+        result.adjacent.insert(result.adjacent.end(), second.begin() + first[i],
+                               std::unique(second.begin() + first[i], second.begin() + end[i]));
+        result.first.push_back(static_cast<int>(result.adjacent.size()));
+    }
+    return result;
+}
+
+}  // namespace
+
+Adjacency ring_of(const std::vector<std::array<int, 3>>& triangles, std::size_t count) {
+    std::vector<std::pair<int, int>> pairs;
+    pairs.reserve(6 * triangles.size());
+    for (const auto& [a, b, c] : triangles)
+        for (const auto& [i, j] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) {
+            pairs.emplace_back(i, j);
+            pairs.emplace_back(j, i);
+        }
+    return from_pairs(pairs, count);
+}
+
+Adjacency Adjacency::extended(const std::vector<std::array<int, 3>>& newborn, std::size_t count) const {
+    if (newborn.empty()) {
+        Adjacency result = *this;
+        result.first.resize(count + 1, result.first.back());
+        return result;
+    }
+    std::vector<std::pair<int, int>> pairs;
+    pairs.reserve(adjacent.size() + 6 * newborn.size());
+    for (std::size_t i = 0; i < size(); ++i)
+        for (const int j : of(i)) pairs.emplace_back(static_cast<int>(i), j);
+    for (std::size_t k = 0; k < newborn.size(); ++k)
+        for (const int j : newborn[k]) {
+            pairs.emplace_back(static_cast<int>(size() + k), j);
+            pairs.emplace_back(j, static_cast<int>(size() + k));
+        }
+    return from_pairs(pairs, count);
+}
+
+Adjacency Adjacency::squared() const {
+    Adjacency result;
+    result.first.reserve(first.size());
+    std::vector<int> seen(size(), -1);
+    for (std::size_t i = 0; i < size(); ++i) {
+        const int self = static_cast<int>(i);
+        seen[i] = self;
+        const auto add = [&](int j) {
+            if (seen[j] == self) return;
+            seen[j] = self;
+            result.adjacent.push_back(j);
+        };
+        for (const int j : of(i)) {
+            add(j);
+            for (const int k : of(j)) add(k);
+        }
+        std::sort(result.adjacent.begin() + result.first.back(), result.adjacent.end());
         result.first.push_back(static_cast<int>(result.adjacent.size()));
     }
     return result;

@@ -11,6 +11,8 @@
 namespace isotrack {
 
 constexpr double kPi = 3.14159265358979323846;
+constexpr double kEmpty =
+    0.8;  // of the spacing: nearest neighbour of a birth; its triangle may be none of the DT any more
 
 std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency,
                             const PopulationBand& band) {
@@ -34,8 +36,9 @@ std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacen
     return keep;
 }
 
-std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& triangles, const Surface& surface,
-                        Id& next_id, const PopulationBand& band) {
+std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triangle>& triangles,
+                                  const Adjacency& adjacency, const Surface& surface, Id& next_id,
+                                  const PopulationBand& band) {
     std::vector<std::pair<double, int>> large;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         const auto& [a, b, c] = triangles[t];
@@ -50,7 +53,7 @@ std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& trian
     std::sort(large.begin(), large.end());
     std::vector<char> touched(particles.size(), 0);
     const auto probe = surface.probe();
-    std::size_t added = 0;
+    std::vector<Triangle> parents;
     for (const auto& [ratio, t] : large) {
         const auto& [a, b, c] = triangles[t];
         if (touched[a] || touched[b] || touched[c]) continue;
@@ -65,12 +68,20 @@ std::size_t fill_sparse(Particles& particles, const std::vector<Triangle>& trian
         if (!p) continue;
         const Vec3 n = probe->normal(*p);
         if (!(n.dot(particles.normal[a] + particles.normal[b] + particles.normal[c]) > 0.0)) continue;
+        const auto is_near = [&](int j) {
+            return n.dot(particles.normal[j]) > 0.0 && (particles.position[j] - *p).norm() < kEmpty * h;
+        };
+        if (std::any_of(triangles[t].begin(), triangles[t].end(), [&](int corner) {
+                const Adjacency::Range near = adjacency.of(corner);
+                return is_near(corner) || std::any_of(near.begin(), near.end(), is_near);
+            }))
+            continue;
         const Vec3 velocity = (particles.velocity[a] + particles.velocity[b] + particles.velocity[c]) / 3.0;
         particles.add(*p, n, h, next_id++, velocity);
         touched[a] = touched[b] = touched[c] = 1;
-        ++added;
+        parents.push_back(triangles[t]);
     }
-    return added;
+    return parents;
 }
 
 std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface,

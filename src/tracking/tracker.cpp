@@ -30,6 +30,9 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3, kMendingSweeps = 2;
+constexpr int kFollowSweeps = 4;
+constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
+constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr int kCertifyRounds = 24;
 constexpr int kFitSteps = 6;
 constexpr double kFitWideExponent = 0.5;
@@ -90,6 +93,45 @@ private:
     std::unique_ptr<Tetrahedralisation> dt_;
 };
 
+/// What the last mesh says about its particles; entries follow those of the particles.
+struct Memory {
+    Adjacency ring;  // along the mesh
+    std::vector<Triangle> triangles;
+    SizingEvidence evidence;
+
+    void retain(const std::vector<char>& keep) {
+        std::vector<int> number(keep.size(), -1);
+        int count = 0;
+        for (std::size_t i = 0; i < keep.size(); ++i) {
+            if (!keep[i]) continue;
+            number[i] = count;
+            evidence.error[count] = evidence.error[i];
+            evidence.thickness[count] = evidence.thickness[i];
+            ++count;
+        }
+        evidence.error.resize(count);
+        evidence.thickness.resize(count);
+        ring = ring.restricted(keep);
+        std::size_t kept = 0;
+        for (const Triangle& t : triangles)
+            if (keep[t[0]] && keep[t[1]] && keep[t[2]])
+                triangles[kept++] = {number[t[0]], number[t[1]], number[t[2]]};
+        triangles.resize(kept);
+    }
+    /// For particles that were added: `parents` are the triangles that the last ones were born in; about the
+    /// others nothing is known.
+    void grow(std::size_t count, const std::vector<Triangle>& parents = {}) {
+        for (std::size_t k = 0; k < parents.size(); ++k) {
+            const auto& [a, b, c] = parents[k];
+            const int i = static_cast<int>(ring.size() + k);
+            triangles.insert(triangles.end(), {{a, b, i}, {b, c, i}, {c, a, i}});
+        }
+        ring = ring.extended(parents, count);
+        evidence.error.resize(count, -1.0);
+        evidence.thickness.resize(count, std::numeric_limits<double>::infinity());
+    }
+};
+
 /// Files hold floats: what is certified must be what is written.
 void round_to_float(Particles& particles) {
     for (Vec3& p : particles.position) p = p.cast<float>().cast<double>();
@@ -105,6 +147,7 @@ struct Tracker::Impl {
     CellLabels labels;
     std::size_t in_dt = 0;  // particles that are in the DT, by their index
     std::vector<int> near;  // per particle not yet in it: one close by, or -1
+    Memory memory;
 
     explicit Impl(const TrackerOptions& o) : options(o) {
         if (!(o.tolerance > 0.0))
@@ -190,6 +233,7 @@ struct Tracker::Impl {
             }
         });
         particles.retain(keep);
+        memory.retain(keep);
         return n - particles.size();
     }
 
@@ -308,6 +352,9 @@ struct Tracker::Impl {
             if (count[i] > 0) particles.velocity[i] /= count[i];
     }
 
+    void follow(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
+    void remember(const FrameMesh& mesh);
+    void remember_errors(const FrameMesh& mesh, const std::vector<TriangleError>& errors);
     void sample(const Surface& surface, const SizingLimits& l,
                 const std::vector<Surface::Crossing>& crossings, bool warm, TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
@@ -337,7 +384,7 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l,
         frame.sweeps += relax(particles, adjacency, surface, kSweepsPerRound);
         if (round + 1 == rounds) break;
         auto keep = uncrowded(particles, adjacency);
-        fill_sparse(particles, particle_triangles(mesh.carved), surface, next_id);
+        fill_sparse(particles, particle_triangles(mesh.carved), adjacency, surface, next_id);
         keep.resize(particles.size(), 1);
         particles.retain(keep);
     }
@@ -353,6 +400,39 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l,
     const StageTimer timer(seconds, "relax");
     frame.sweeps +=
         relax(particles, vertex_adjacency(dt->cells(), particles.size()), surface, kMendingSweeps);
+}
+
+/// What the last mesh knows is good enough for the next frame's particles: no DT is needed.
+void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, TrackedFrame& frame) {
+    {
+        const StageTimer timer(frame.seconds, "size");
+        memory.grow(particles.size());
+        update_spacing(particles, memory.ring, memory.evidence, l);
+    }
+    const StageTimer timer(frame.seconds, "relax");
+    auto keep = uncrowded(particles, memory.ring, kFollowBand);
+    const std::vector<Triangle> parents =
+        fill_sparse(particles, memory.triangles, memory.ring.squared(), surface, next_id, kFollowBand);
+    memory.grow(particles.size(), parents);
+    keep.resize(particles.size(), 1);
+    particles.retain(keep);
+    memory.retain(keep);
+    frame.sweeps += relax(particles, memory.ring.squared(), surface, kFollowSweeps);
+}
+
+void Tracker::Impl::remember_errors(const FrameMesh& mesh, const std::vector<TriangleError>& errors) {
+    memory.evidence.error.assign(particles.size(), -1.0);
+    for (std::size_t t = 0; t < errors.size(); ++t)
+        for (const int v : mesh.carved.triangles[t])
+            if (const int p = mesh.carved.particle[v]; p >= 0)
+                memory.evidence.error[p] = std::max(memory.evidence.error[p], errors[t].largest);
+}
+
+void Tracker::Impl::remember(const FrameMesh& mesh) {
+    memory.triangles = particle_triangles(mesh.carved);
+    memory.evidence.error.resize(particles.size(), -1.0);
+    memory.evidence.thickness = thickness_of(particles, vertex_adjacency(dt->cells(), particles.size()));
+    memory.ring = ring_of(memory.triangles, particles.size());
 }
 
 void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm,
@@ -390,6 +470,8 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
     const std::vector<Surface::Crossing> crossings = surface.crossings();
     if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
+    else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))
+        follow(surface, l, frame);
     else
         sample(surface, l, crossings, warm, frame);
     tetrahedralise(true, seconds);
@@ -412,11 +494,13 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
             }
         }
         inspection = inspect(mesh, surface, l, crossings);
+        if (round == 0) remember_errors(mesh, inspection.errors);
         if (last || mend(mesh, inspection, surface, l) == 0) break;
         whole = false;
         tetrahedralise(false, seconds);
     }
     report(mesh, inspection, l, frame);
+    remember(mesh);
     remove_specks(mesh, inspection);
     inherit_velocities(particle_triangles(mesh.carved), first_new);
 

@@ -419,7 +419,9 @@ TEST(FillSparse, AddsInLargeTrianglesAndNoTwoSideBySide) {
     const auto triangles = hull(particles);
     const std::size_t before = particles.size();
     Id next_id = 1000;
-    const std::size_t added = fill_sparse(particles, triangles, *sphere, next_id);
+    const std::vector<Triangle> parents =
+        fill_sparse(particles, triangles, adjacency_of(particles), *sphere, next_id);
+    const std::size_t added = parents.size();
     EXPECT_GT(added, 20u);
     ASSERT_EQ(particles.size(), before + added);
     EXPECT_EQ(next_id, static_cast<Id>(1000 + added));
@@ -427,12 +429,17 @@ TEST(FillSparse, AddsInLargeTrianglesAndNoTwoSideBySide) {
         EXPECT_NEAR(particles.position[i].norm(), 1.0, 1e-5);
         EXPECT_NEAR(particles.spacing[i], 0.2, 1e-12);
         EXPECT_GT(nearest_distance(particles, i), 0.85 * 0.2 * 0.99);
+        const auto& [a, b, c] = parents[i - before];
+        const Vec3 middle = (particles.position[a] + particles.position[b] + particles.position[c]) / 3.0;
+        EXPECT_LT((particles.position[i] - middle).norm(), 0.4);
     }
+    const auto fill = [&](Particles& all) {
+        return fill_sparse(all, hull(all), adjacency_of(all), *sphere, next_id);
+    };
     // Filled again and again it comes to an end, with no triangle left that is too large.
-    for (int round = 0; round < 20 && fill_sparse(particles, hull(particles), *sphere, next_id) > 0;
-         ++round) {
+    for (int round = 0; round < 20 && !fill(particles).empty(); ++round) {
     }
-    EXPECT_EQ(fill_sparse(particles, hull(particles), *sphere, next_id), 0u);
+    EXPECT_TRUE(fill(particles).empty());
     for (const auto& [a, b, c] : hull(particles)) {
         const Vec3 &p = particles.position[a], &q = particles.position[b], &r = particles.position[c];
         const double radius =
@@ -444,8 +451,54 @@ TEST(FillSparse, AddsInLargeTrianglesAndNoTwoSideBySide) {
 TEST(FillSparse, LeavesAGoodPackingAlone) {
     Particles particles = settled_on_unit_sphere(400, 0.19);
     Id next_id = 400;
-    EXPECT_EQ(fill_sparse(particles, hull(particles), *shapes::sphere({0, 0, 0}, 1.0, 0.1), next_id), 0u);
-    EXPECT_EQ(fill_sparse(particles, {}, *shapes::sphere({0, 0, 0}, 1.0, 0.1), next_id), 0u);
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const Adjacency adjacency = adjacency_of(particles);
+    EXPECT_TRUE(fill_sparse(particles, hull(particles), adjacency, *sphere, next_id).empty());
+    EXPECT_TRUE(fill_sparse(particles, {}, adjacency, *sphere, next_id).empty());
+}
+
+TEST(FillSparse, IsNotMisledByTrianglesThatAreNotThoseOfADT) {
+    Particles particles = settled_on_unit_sphere(400, 0.19);
+    const Adjacency adjacency = adjacency_of(particles);
+    // Across every edge the corners beyond it and one of its ends: obtuse, and far larger than any real one.
+    std::vector<Triangle> wrong;
+    const auto triangles = hull(particles);
+    for (const auto& [a, b, c] : triangles)
+        for (const auto& t : triangles) {
+            if (std::count(t.begin(), t.end(), a) + std::count(t.begin(), t.end(), b) != 2 ||
+                std::count(t.begin(), t.end(), c) == 1)
+                continue;
+            for (const int d : t)
+                if (d != a && d != b) wrong.push_back({a, d, c});
+        }
+    ASSERT_GE(wrong.size(), triangles.size());
+    Id next_id = 400;
+    EXPECT_TRUE(
+        fill_sparse(particles, wrong, adjacency, *shapes::sphere({0, 0, 0}, 1.0, 0.1), next_id).empty());
+}
+
+TEST(Adjacency, RingSquareGapsAndNewborn) {
+    // A strip 0 1 2 3 4 of triangles.
+    const Adjacency ring = ring_of({{0, 1, 2}, {1, 3, 2}, {2, 3, 4}}, 6);
+    const auto list = [](const Adjacency& a, std::size_t i) {
+        return std::vector<int>(a.of(i).begin(), a.of(i).end());
+    };
+    ASSERT_EQ(ring.size(), 6u);
+    EXPECT_EQ(list(ring, 0), (std::vector<int>{1, 2}));
+    EXPECT_EQ(list(ring, 2), (std::vector<int>{0, 1, 3, 4}));
+    EXPECT_TRUE(list(ring, 5).empty());
+    EXPECT_EQ(list(ring.squared(), 0), (std::vector<int>{1, 2, 3, 4}));
+    EXPECT_EQ(list(ring.squared(), 4), (std::vector<int>{0, 1, 2, 3}));
+    // Without 2 its neighbours 0 1 3 4 know each other; they are numbered 0 1 2 3 now.
+    const Adjacency gap = ring.restricted({1, 1, 0, 1, 1, 1});
+    ASSERT_EQ(gap.size(), 5u);
+    EXPECT_EQ(list(gap, 0), (std::vector<int>{1, 2, 3}));
+    EXPECT_EQ(list(gap, 2), (std::vector<int>{0, 1, 3}));
+    const Adjacency more = ring.extended({{1, 2, 3}}, 8);
+    ASSERT_EQ(more.size(), 8u);
+    EXPECT_EQ(list(more, 6), (std::vector<int>{1, 2, 3}));
+    EXPECT_EQ(list(more, 1), (std::vector<int>{0, 2, 3, 6}));
+    EXPECT_TRUE(list(more, 7).empty());
 }
 
 TEST(Densify, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {

@@ -1,6 +1,8 @@
 // Who is next to whom.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <vector>
 
 namespace isotrack {
@@ -19,9 +21,18 @@ struct Adjacency {
     };
     Range of(std::size_t i) const { return {adjacent.data() + first[i], adjacent.data() + first[i + 1]}; }
     std::size_t size() const { return first.size() - 1; }
-    /// Of the particles whose flag is set, renumbered as `Particles::retain` does.
+    /// Of the particles whose flag is set, renumbered as `Particles::retain` does. Those around one that is
+    /// left out become neighbours of each other.
     Adjacency restricted(const std::vector<char>& keep) const;
+    /// Of `count` particles: `newborn` k, neighbour of three others, is number `size() + k`; the rest have no
+    /// neighbours yet.
+    Adjacency extended(const std::vector<std::array<int, 3>>& newborn, std::size_t count) const;
+    /// Neighbours and their neighbours.
+    Adjacency squared() const;
 };
+
+/// Which of `count` particles share an edge of a triangle.
+Adjacency ring_of(const std::vector<std::array<int, 3>>& triangles, std::size_t count);
 
 /// The groups of a colouring in which no two neighbours have the same colour, so that the members of a group
 /// can be treated at the same time. Greedy in the order of the particles: the same at any thread count.
