@@ -53,8 +53,11 @@ public:
         return cells_.vertices[f.cell][Tetrahedra::kFacet[f.k][corner]];
     }
 
+    struct Side {
+        int facet, corner;  // the edge opposite this corner
+    };
     /// The facet on the other side of the edge opposite `corner`, by rotation through inside cells.
-    int mate(int facet, int corner) const {
+    Side mate(int facet, int corner) const {
         int cell = facets_[facet].cell;
         int cross =
             Tetrahedra::kFacet[facets_[facet].k][corner];  // the facet to cross next is opposite this vertex
@@ -67,7 +70,8 @@ public:
             cross = cells_.index_of(next, pivot);
             other = entry;
         }
-        return number_[4 * cell + cross];
+        const auto& f = Tetrahedra::kFacet[cross];
+        return {number_[4 * cell + cross], f[0] == other ? 0 : f[1] == other ? 1 : 2};
     }
 
 private:
@@ -84,13 +88,21 @@ struct HalfEdge {
     }
 };
 
-std::vector<HalfEdge> sorted_half_edges(const std::vector<Triangle>& triangles) {
-    std::vector<HalfEdge> edges;
-    edges.reserve(3 * triangles.size());
+/// Sorted: by a counting sort over the vertices they start from, which leaves a handful to sort at each.
+std::vector<HalfEdge> sorted_half_edges(const std::vector<Triangle>& triangles, std::size_t vertices) {
+    std::vector<int> first(vertices + 1, 0);
+    for (const Triangle& t : triangles)
+        for (const int v : t) ++first[v + 1];
+    for (std::size_t v = 0; v < vertices; ++v) first[v + 1] += first[v];
+    std::vector<int> end(first.begin(), first.end() - 1);
+    std::vector<HalfEdge> edges(3 * triangles.size());
     for (std::size_t t = 0; t < triangles.size(); ++t)
-        for (int k = 0; k < 3; ++k)
-            edges.push_back({triangles[t][(k + 1) % 3], triangles[t][(k + 2) % 3], static_cast<int>(t), k});
-    std::sort(edges.begin(), edges.end());
+        for (int k = 0; k < 3; ++k) {
+            const int from = triangles[t][(k + 1) % 3], to = triangles[t][(k + 2) % 3];
+            edges[end[from]++] = {from, to, static_cast<int>(t), k};
+        }
+    for (std::size_t v = 0; v < vertices; ++v)
+        std::sort(edges.begin() + first[v], edges.begin() + first[v + 1]);
     return edges;
 }
 
@@ -101,17 +113,17 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     const auto& facets = boundary.facets();
     const std::size_t count = facets.size();
 
-    std::vector<Triangle> mates(count);
+    std::vector<Triangle> mates(count, {-1, -1, -1});
     CornerSets sets(3 * count);
     for (std::size_t f = 0; f < count; ++f)
         for (int k = 0; k < 3; ++k) {
-            const int g = mates[f][k] = boundary.mate(static_cast<int>(f), k);
-            for (const int end : {(k + 1) % 3, (k + 2) % 3}) {
-                const int p = boundary.particle(static_cast<int>(f), end);
-                int same = 0;
-                while (boundary.particle(g, same) != p) ++same;
-                sets.unite(static_cast<int>(3 * f) + end, 3 * g + same);
-            }
+            if (mates[f][k] >= 0) continue;
+            const Boundary::Side g = boundary.mate(static_cast<int>(f), k);
+            mates[f][k] = g.facet;
+            mates[g.facet][g.corner] = static_cast<int>(f);
+            // Mates run along their edge in opposite directions.
+            sets.unite(static_cast<int>(3 * f) + (k + 1) % 3, 3 * g.facet + (g.corner + 2) % 3);
+            sets.unite(static_cast<int>(3 * f) + (k + 2) % 3, 3 * g.facet + (g.corner + 1) % 3);
         }
 
     // The first corner set at a particle, in the order of the facets, is its own vertex; the others are
@@ -137,10 +149,13 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
         const int p = boundary.particle(c / 3, c % 3);
         vertex_of_set[c] = static_cast<int>(result.particle.size());
         result.particle.push_back(p);
-        if (result.pinched.empty() || result.pinched.back() != p) result.pinched.push_back(p);
+        result.pinched.push_back({p, facets[c / 3].cell});
     }
-    std::sort(result.pinched.begin(), result.pinched.end());
-    result.pinched.erase(std::unique(result.pinched.begin(), result.pinched.end()), result.pinched.end());
+    std::sort(result.pinched.begin(), result.pinched.end(),
+              [](const auto& a, const auto& b) { return a.particle < b.particle; });
+    result.pinched.erase(std::unique(result.pinched.begin(), result.pinched.end(),
+                                     [](const auto& a, const auto& b) { return a.particle == b.particle; }),
+                         result.pinched.end());
 
     result.triangles.resize(count);
     std::vector<Triangle> in_particles(count);
@@ -153,14 +168,13 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
         result.inside_facet.push_back(facets[f].k);
     }
 
-    const auto raw_edges = sorted_half_edges(in_particles);
+    const auto raw_edges = sorted_half_edges(in_particles, points.size());
     for (std::size_t e = 1; e < raw_edges.size(); ++e) {
         const HalfEdge &a = raw_edges[e - 1], &b = raw_edges[e];
         const bool repeated = a.from == b.from && a.to == b.to;
         const bool counted = e >= 2 && raw_edges[e - 2].from == b.from && raw_edges[e - 2].to == b.to;
         if (!repeated || counted || a.from > a.to) continue;
-        ++result.complex_edges;
-        result.complex_edge_ends.insert(result.complex_edge_ends.end(), {a.from, a.to});
+        result.complex_edges.push_back({a.from, a.to, facets[a.triangle].cell});
     }
 
     std::vector<char> in_dt(points.size(), 0);
@@ -172,10 +186,10 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
 
     // Different edges between the same two output vertices: they get midpoints. `mates` keeps the pairs
     // apart.
-    if (result.complex_edges > 0) {
+    if (!result.complex_edges.empty()) {
         // Where that happens every edge over the same two particles is split, so that what touches keeps
         // touching in whole edges.
-        const auto edges = sorted_half_edges(result.triangles);
+        const auto edges = sorted_half_edges(result.triangles, result.particle.size());
         std::vector<std::pair<int, int>> ambiguous;
         const auto particles_of = [&](const HalfEdge& e) {
             return std::minmax(result.particle[e.from], result.particle[e.to]);

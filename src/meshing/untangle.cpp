@@ -46,26 +46,6 @@ bool is_complex(const CellLabels& labels, const std::vector<int>& ring) {
     return changes > 2;
 }
 
-/// Complex edges, each once.
-std::vector<Edge> complex_edges(const Tetrahedra& cells, const CellLabels& labels) {
-    std::vector<Edge> edges;
-    for (int c = 0; c < static_cast<int>(cells.size()); ++c) {
-        if (!labels[c]) continue;
-        for (int k = 0; k < 4; ++k) {
-            if (labels[cells.neighbours[c][k]]) continue;
-            const auto& f = Tetrahedra::kFacet[k];
-            for (int e = 0; e < 3; ++e) edges.push_back(edge_of(cells, c, f[e], f[(e + 1) % 3]));
-        }
-    }
-    std::sort(edges.begin(), edges.end());
-    std::vector<Edge> result;
-    for (std::size_t e = 0, end; e < edges.size(); e = end) {
-        for (end = e + 1; end < edges.size() && edges[end].same_place(edges[e]);) ++end;
-        if (end - e > 2) result.push_back(edges[e]);
-    }
-    return result;
-}
-
 /// The cells around a vertex, split into sets of one label that hang together through facets at the vertex.
 std::vector<std::vector<int>> fans_of(const Tetrahedra& cells, const CellLabels& labels, int vertex,
                                       int cell) {
@@ -127,7 +107,7 @@ std::size_t tangles(const Tetrahedra& cells, const CellLabels& labels, const std
 }  // namespace
 
 bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec3>& points,
-              const Surface& surface, const std::vector<int>& pinched) {
+              const Surface& surface, const CarvedSurface& carved) {
     const auto probe = surface.probe();
     const double limit = kUncertain * surface.resolution();
     struct Run {
@@ -160,8 +140,8 @@ bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec
 
     bool any = false;
     std::vector<int> ring;
-    for (const Edge& edge : complex_edges(cells, labels)) {
-        ring_of(cells, edge, ring);
+    for (const auto& e : carved.complex_edges) {
+        ring_of(cells, {e.from, e.to, e.cell}, ring);
         if (!is_complex(labels, ring)) continue;
         std::size_t start = 0;  // of a run
         while (labels[ring[start]] == labels[ring[(start + ring.size() - 1) % ring.size()]]) ++start;
@@ -174,13 +154,8 @@ bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec
         }
         any = relabel(runs) || any;
     }
-    if (pinched.empty()) return any;
-    std::vector<int> cell_at(points.size(), -1);
-    for (std::size_t c = 0; c < cells.size(); ++c)
-        for (const int v : cells.vertices[c])
-            if (v >= 0) cell_at[v] = static_cast<int>(c);
-    for (const int v : pinched) {
-        const auto fans = fans_of(cells, labels, v, cell_at[v]);
+    for (const auto& [v, cell] : carved.pinched) {
+        const auto fans = fans_of(cells, labels, v, cell);
         if (fans.size() <= 2) continue;
         std::vector<Run> runs;
         for (const auto& fan : fans) runs.push_back(run_of(fan));

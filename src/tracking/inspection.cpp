@@ -127,11 +127,9 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     }
     for (const auto& c : inspection.missed) result.push_back({c.point, 2.0 * surface.resolution()});
     for (const Vec3& p : inspection.doubtful) result.push_back({p, surface.resolution()});
-    for (std::size_t e = 0; e + 1 < carved.complex_edge_ends.size(); e += 2) {
-        const int p = carved.complex_edge_ends[e], q = carved.complex_edge_ends[e + 1];
-        result.push_back({0.5 * (particles.position[p] + particles.position[q]),
-                          0.7 * std::min(particles.spacing[p], particles.spacing[q])});
-    }
+    for (const auto& e : carved.complex_edges)
+        result.push_back({0.5 * (particles.position[e.from] + particles.position[e.to]),
+                          0.7 * std::min(particles.spacing[e.from], particles.spacing[e.to])});
     return result;
 }
 

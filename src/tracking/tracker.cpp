@@ -265,7 +265,7 @@ struct Tracker::Impl {
         mesh.carved = carve(cells, labels, particles.position);
         if (options.reconstruction == Reconstruction::Guided)
             for (int pass = 0; pass < kUntanglingPasses && !mesh.carved.pinched.empty() &&
-                               untangle(labels, cells, particles.position, surface, mesh.carved.pinched);
+                               untangle(labels, cells, particles.position, surface, mesh.carved);
                  ++pass)
                 mesh.carved = carve(cells, labels, particles.position);
         std::size_t midpoint = 0;

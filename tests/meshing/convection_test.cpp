@@ -213,9 +213,15 @@ std::string wrong_count(const Tetrahedra& cells, const CellLabels& labels, const
     std::set<std::pair<int, int>> complex, said;
     for (const auto& [edge, count] : facets_at_edge)
         if (count > 2) complex.insert(edge);
-    for (std::size_t e = 0; e + 1 < carved.complex_edge_ends.size(); e += 2)
-        said.insert(std::minmax(carved.complex_edge_ends[e], carved.complex_edge_ends[e + 1]));
-    if (said != complex || carved.complex_edges != complex.size()) return "complex edges";
+    const auto holds = [&](int cell, int particle) {
+        const auto& v = cells.vertices[cell];
+        return labels[cell] && std::count(v.begin(), v.end(), particle) == 1;
+    };
+    for (const auto& e : carved.complex_edges) {
+        said.insert(std::minmax(e.from, e.to));
+        if (!holds(e.cell, e.from) || !holds(e.cell, e.to)) return "a complex edge's cell";
+    }
+    if (said != complex || carved.complex_edges.size() != complex.size()) return "complex edges";
     std::vector<int> unused;
     std::set_difference(in_dt.begin(), in_dt.end(), on_boundary.begin(), on_boundary.end(),
                         std::back_inserter(unused));
@@ -226,7 +232,12 @@ std::string wrong_count(const Tetrahedra& cells, const CellLabels& labels, const
     std::vector<int> pinched;
     for (const auto& [p, count] : copies)
         if (count > 1) pinched.push_back(p);
-    if (carved.pinched != pinched) return "pinched particles";
+    std::vector<int> said_pinched;
+    for (const auto& v : carved.pinched) {
+        said_pinched.push_back(v.particle);
+        if (!holds(v.cell, v.particle)) return "a pinched particle's cell";
+    }
+    if (said_pinched != pinched) return "pinched particles";
     return "";
 }
 
@@ -252,7 +263,7 @@ TEST(Carve, IsClosedOrientedAndManifoldForRandomLabels) {
         ASSERT_EQ(t.unused_vertices, 0u) << "round " << round;
         ASSERT_NEAR(enclosed_volume(mesh), volume, 1e-9 * (1.0 + volume)) << "round " << round;
         ASSERT_EQ(wrong_count(cells, labels, carved), "") << "round " << round;
-        complex += carved.complex_edges;
+        complex += carved.complex_edges.size();
         pinched += carved.pinched.size();
         split += carved.midpoints.size();
     }
@@ -330,7 +341,7 @@ TEST(Carve, GivesTwoVerticesToSolidsThatTouchInOne) {
             ASSERT_EQ(t.components, 2u) << shared;
             ASSERT_EQ(t.euler, 4) << shared;
             ASSERT_EQ(carved.pinched.size(), static_cast<std::size_t>(shared));
-            ASSERT_EQ(carved.complex_edges, shared == 2 ? 1u : 0u);
+            ASSERT_EQ(carved.complex_edges.size(), shared == 2 ? 1u : 0u);
         }
     EXPECT_GT(seen[1], 0);
     EXPECT_GT(seen[2], 0);
@@ -607,16 +618,16 @@ TEST(Untangle, LeavesFewerComplexEdgesAndPinchedVerticesAndNothingWhereThereWere
         const auto& points = s.particles.position;
         CellLabels labels = guided_convection(s.cells, points, s.particles.normal, *surface);
         CarvedSurface carved = carve(s.cells, labels, points);
-        const std::size_t count = carved.complex_edges + carved.pinched.size();
+        const std::size_t count = carved.complex_edges.size() + carved.pinched.size();
         before += count;
         const CellLabels untouched = labels;
-        for (int pass = 0; pass < 4 && untangle(labels, s.cells, points, *surface, carved.pinched); ++pass)
+        for (int pass = 0; pass < 4 && untangle(labels, s.cells, points, *surface, carved); ++pass)
             carved = carve(s.cells, labels, points);
         if (count == 0) {
             EXPECT_EQ(labels, untouched);
         }
-        EXPECT_LE(carved.complex_edges + carved.pinched.size(), count);
-        after += carved.complex_edges + carved.pinched.size();
+        EXPECT_LE(carved.complex_edges.size() + carved.pinched.size(), count);
+        after += carved.complex_edges.size() + carved.pinched.size();
         const auto probe = surface->probe();
         for (std::size_t c = 0; c < labels.size(); ++c) {
             if (labels[c] == untouched[c]) continue;

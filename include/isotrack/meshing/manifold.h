@@ -19,10 +19,16 @@ struct CarvedSurface {
                                     ///< halves keep its cell.
     std::vector<int> inside_facet;  ///< Per triangle: the index of that cell's vertex opposite the facet.
 
-    std::size_t complex_edges = 0;       ///< Edges of the DT with four or more boundary facets.
-    std::vector<int> complex_edge_ends;  ///< Their particles, two per edge.
-    std::vector<int> pinched;            ///< Particles that needed more than one output vertex.
-    std::vector<int> unused;             ///< Particles of the DT on no boundary facet.
+    struct Edge {
+        int from, to;  ///< Particles.
+        int cell;      ///< An inside cell that has both.
+    };
+    std::vector<Edge> complex_edges;  ///< Edges of the DT with four or more boundary facets.
+    struct Pinch {
+        int particle, cell;  ///< An inside cell that has it.
+    };
+    std::vector<Pinch> pinched;  ///< Particles that needed more than one output vertex, ascending.
+    std::vector<int> unused;     ///< Particles of the DT on no boundary facet.
 };
 
 /// Every half-edge is mated with the one found by rotating through inside cells, so solids that touch stay
