@@ -57,12 +57,48 @@ bool is_needle(const FrameMesh& mesh, const Particles& particles, std::size_t tr
     return longest > kAnglesFrom * resolution;
 }
 
+std::vector<Inspection::Facet> facets_of(const FrameMesh& mesh) {
+    std::vector<Inspection::Facet> facets;
+    facets.reserve(mesh.carved.triangles.size());
+    for (std::size_t t = 0; t < mesh.carved.triangles.size(); ++t) {
+        const auto& [i, j, k] = mesh.carved.triangles[t];
+        const int key = corners_of(mesh.carved, t).whole
+                            ? 4 * mesh.carved.inside_cell[t] + mesh.carved.inside_facet[t]
+                            : -1;
+        facets.push_back({key, {mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]}});
+    }
+    return facets;
+}
+
+/// Mesh to surface. Triangles are in the order of their cells, so those of `before` are met in one go.
+void measure_errors(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
+                    const Inspection& before, Inspection& result) {
+    result.facets = facets_of(mesh);
+    result.errors.resize(result.facets.size());
+    std::vector<int> fresh;
+    std::vector<Triangle> triangles;
+    std::size_t old = 0;
+    for (std::size_t t = 0; t < result.facets.size(); ++t) {
+        const Inspection::Facet& facet = result.facets[t];
+        while (facet.key >= 0 && old < before.facets.size() && before.facets[old].key < facet.key) ++old;
+        if (facet.key >= 0 && old < before.facets.size() && before.facets[old].key == facet.key &&
+            before.facets[old].corner == facet.corner) {
+            result.errors[t] = before.errors[old];
+        } else {
+            fresh.push_back(static_cast<int>(t));
+            triangles.push_back(mesh.carved.triangles[t]);
+        }
+    }
+    const auto errors =
+        triangle_errors(mesh.vertices, triangles, surface, kSteps, kSuspect * limits.tolerance);
+    for (std::size_t f = 0; f < fresh.size(); ++f) result.errors[fresh[f]] = errors[f];
+}
+
 /// Mesh to surface, and some crossings of the surface to the mesh.
 Inspection held_against(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                        const std::vector<Surface::Crossing>& crossings) {
+                        const std::vector<Surface::Crossing>& crossings, const Inspection& before) {
     Inspection result;
-    result.errors =
-        triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSteps, kSuspect * limits.tolerance);
+    measure_errors(mesh, surface, limits, before, result);
     const auto distances =
         crossing_distances(mesh.vertices, mesh.carved.triangles, crossings, kLostAt * limits.tolerance);
     double sum = 0.0;
@@ -84,12 +120,12 @@ Inspection held_against(const FrameMesh& mesh, const Surface& surface, const Siz
 
 Inspection inspect_again(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
                          const Inspection& before) {
-    return held_against(mesh, surface, limits, before.missed);
+    return held_against(mesh, surface, limits, before.missed, before);
 }
 
 Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                   const std::vector<Surface::Crossing>& crossings) {
-    Inspection result = held_against(mesh, surface, limits, crossings);
+                   const std::vector<Surface::Crossing>& crossings, const Inspection& before) {
+    Inspection result = held_against(mesh, surface, limits, crossings, before);
     result.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, surface, crossings);
     if (result.topology.faults.empty()) return result;
     const double near = kFaultReach * surface.resolution();

@@ -1,6 +1,7 @@
 // One frame's mesh held against its surface, and what would mend it.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "isotrack/meshing/certify.h"
@@ -20,7 +21,12 @@ struct FrameMesh {
 };
 
 struct Inspection {
-    std::vector<TriangleError> errors;      ///< Per triangle.
+    std::vector<TriangleError> errors;  ///< Per triangle.
+    struct Facet {
+        int key;  ///< Of the cell and its facet; ascending but for halves of split triangles, which have -1.
+        std::array<Vec3, 3> corner;
+    };
+    std::vector<Facet> facets;              ///< Per triangle, as the errors were measured.
     std::vector<Surface::Crossing> missed;  ///< Crossings farther from the mesh than the tolerance.
     double farthest_crossing = 0.0, crossings_mean_square = 0.0;  ///< Of those that were found.
     std::size_t lost_crossings = 0;                               ///< Those that were not.
@@ -28,11 +34,11 @@ struct Inspection {
     std::vector<Vec3> doubtful;  ///< Crossings near its faults.
 };
 
-/// Both ways, and the topology.
+/// Both ways, and the topology. Errors of triangles that `before` has, too, are taken over.
 Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                   const std::vector<Surface::Crossing>& crossings);
+                   const std::vector<Surface::Crossing>& crossings, const Inspection& before);
 
-/// Mesh to surface, and the crossings that `before` missed.
+/// Mesh to surface, and only those crossings that `before` missed.
 Inspection inspect_again(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
                          const Inspection& before);
 

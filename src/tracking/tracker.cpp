@@ -394,7 +394,7 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l,
     if (options.fit) fit_vertices(mesh, surface, seconds);
     {
         const StageTimer timer(seconds, "certify");
-        if (mend(mesh, inspect(mesh, surface, l, crossings), surface, l) == 0) return;
+        if (mend(mesh, inspect(mesh, surface, l, crossings, {}), surface, l) == 0) return;
     }
     tetrahedralise(false, seconds);
     const StageTimer timer(seconds, "relax");
@@ -493,7 +493,7 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
                 continue;
             }
         }
-        inspection = inspect(mesh, surface, l, crossings);
+        inspection = inspect(mesh, surface, l, crossings, inspection);
         if (round == 0) remember_errors(mesh, inspection.errors);
         if (last || mend(mesh, inspection, surface, l) == 0) break;
         whole = false;
