@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -135,80 +136,61 @@ std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec
     return middle + 0.5 * (inside + outside) * axis;
 }
 
-std::vector<double> crossing_distances(const std::vector<Vec3>& points,
-                                       const std::vector<Triangle>& triangles,
-                                       const std::vector<Surface::Crossing>& crossings, double cutoff) {
-    std::vector<double> result(crossings.size(), std::numeric_limits<double>::infinity());
-    if (crossings.empty() || triangles.empty()) return result;
+namespace {
 
-    // Triangles are entered into the cells of a grid that their box, widened by the cutoff, touches; a
-    // crossing looks into its own cell.
-    Box box;
-    for (const auto& c : crossings) box.extend(c.point);
-    double mean_edge = 0.0;
-    for (const auto& t : triangles) mean_edge += (points[t[0]] - points[t[1]]).norm();
-    const double cell_size = std::max(
-        {mean_edge / static_cast<double>(triangles.size()), 2.0 * cutoff, box.diagonal().norm() * 1e-6});
-    Eigen::Array<std::int64_t, 3, 1> size =
-        (box.sizes() / cell_size).array().floor().cast<std::int64_t>() + 1;
-    const auto cell_of = [&](const Vec3& p) {
-        return Eigen::Array<std::int64_t, 3, 1>(
-            ((p - box.min()) / cell_size).array().floor().cast<std::int64_t>());
-    };
-    const auto key_of = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
-        return (x * size[1] + y) * size[2] + z;
-    };
-
-    std::vector<Vec3> normals(triangles.size());
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-        const Vec3& a = points[triangles[t][0]];
-        normals[t] = (points[triangles[t][1]] - a).cross(points[triangles[t][2]] - a).normalized();
-    }
-
-    struct Entry {
-        std::int64_t key;
-        int index;
-        bool operator<(const Entry& o) const { return key < o.key || (key == o.key && index < o.index); }
-    };
-    std::vector<Entry> queries(crossings.size());
-    for (std::size_t c = 0; c < crossings.size(); ++c) {
-        const auto cell = cell_of(crossings[c].point).min(size - 1).max(0).eval();
-        queries[c] = {key_of(cell[0], cell[1], cell[2]), static_cast<int>(c)};
-    }
-    std::sort(queries.begin(), queries.end());
-    std::vector<std::int64_t> occupied;
-    for (const Entry& q : queries)
-        if (occupied.empty() || occupied.back() != q.key) occupied.push_back(q.key);
-
-    std::vector<Entry> entries;
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-        Box reach;
-        for (const int v : triangles[t]) reach.extend(points[v]);
-        const auto low = cell_of(reach.min() - Vec3::Constant(cutoff)).max(0).eval();
-        const auto high = cell_of(reach.max() + Vec3::Constant(cutoff)).min(size - 1).eval();
-        for (std::int64_t x = low[0]; x <= high[0]; ++x)
-            for (std::int64_t y = low[1]; y <= high[1]; ++y) {
-                auto it = std::lower_bound(occupied.begin(), occupied.end(), key_of(x, y, low[2]));
-                for (; it != occupied.end() && *it <= key_of(x, y, high[2]); ++it)
-                    entries.push_back({*it, static_cast<int>(t)});
-            }
-    }
-    std::sort(entries.begin(), entries.end());
-
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, queries.size(), 256), [&](const auto& range) {
-        for (std::size_t q = range.begin(); q < range.end(); ++q) {
-            const Vec3& p = crossings[queries[q].index].point;
-            const Vec3 outward = crossings[queries[q].index].outward.cast<double>();
-            double least = std::numeric_limits<double>::infinity();
-            auto it = std::lower_bound(entries.begin(), entries.end(), Entry{queries[q].key, -1});
-            for (; it != entries.end() && it->key == queries[q].key; ++it) {
-                const auto& t = triangles[it->index];
-                if (normals[it->index].dot(outward) < kFacing) continue;
-                least = std::min(least, squared_distance(p, points[t[0]], points[t[1]], points[t[2]]));
-            }
-            if (least <= cutoff * cutoff) result[queries[q].index] = std::sqrt(least);
+/// The least squared distance that several threads find; infinite at first.
+class LeastSquare {
+public:
+    double get() const { return value_.load(std::memory_order_relaxed); }
+    void take(double candidate) {
+        double now = get();
+        while (candidate < now && !value_.compare_exchange_weak(now, candidate, std::memory_order_relaxed)) {
         }
-    });
+    }
+
+private:
+    std::atomic<double> value_{std::numeric_limits<double>::infinity()};
+};
+
+}  // namespace
+
+std::vector<double> crossing_distances(const std::vector<Vec3>& points,
+                                       const std::vector<Triangle>& triangles, const CrossingGrid& grid,
+                                       double cutoff) {
+    const std::vector<Surface::Crossing>& crossings = grid.crossings();
+    std::vector<LeastSquare> least(crossings.size());
+    // Looks `reach` far for the crossings that have nothing within `found` yet.
+    const auto search = [&](double reach, double found) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
+            for (std::size_t t = range.begin(); t < range.end(); ++t) {
+                const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
+                           &c = points[triangles[t][2]];
+                const Vec3 normal = (b - a).cross(c - a).normalized();
+                Box box(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c));
+                box.min().array() -= reach;
+                box.max().array() += reach;
+                grid.for_each_in(box, [&](std::size_t i) {
+                    const double known = least[i].get();
+                    if (known <= found * found) return;
+                    const double off_plane = normal.dot(crossings[i].point - a);
+                    if (off_plane * off_plane > std::min(reach * reach, known)) return;
+                    if (normal.dot(crossings[i].outward.cast<double>()) < kFacing) return;
+                    least[i].take(squared_distance(crossings[i].point, a, b, c));
+                });
+            }
+        });
+    };
+    // Most are near.
+    constexpr double kNear = 0.4;
+    search(kNear * cutoff, 0.0);
+    const auto beyond = [&](double distance) {
+        return [distance](const LeastSquare& l) { return l.get() > distance * distance; };
+    };
+    if (std::any_of(least.begin(), least.end(), beyond(kNear * cutoff))) search(cutoff, kNear * cutoff);
+    std::vector<double> result;
+    result.reserve(least.size());
+    for (const LeastSquare& l : least)
+        result.push_back(beyond(cutoff)(l) ? std::numeric_limits<double>::infinity() : std::sqrt(l.get()));
     return result;
 }
 

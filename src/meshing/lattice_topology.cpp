@@ -1,10 +1,11 @@
 #include "isotrack/meshing/lattice_topology.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <map>
 #include <numeric>
 #include <tuple>
 
@@ -70,6 +71,26 @@ std::vector<Hit> hits_of(const std::vector<Vec3>& points, const std::vector<Tria
             }
     }
     return hits;
+}
+
+/// Sorts by x, then by `less`.
+template <typename Less>
+void sort_by_x(std::vector<Hit>& hits, const Less& less) {
+    if (hits.empty()) return;
+    const auto [low, high] =
+        std::minmax_element(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) { return a.x < b.x; });
+    const int from = low->x;
+    std::vector<std::size_t> first(static_cast<std::size_t>(high->x - from) + 2, 0);
+    for (const Hit& h : hits) ++first[h.x - from + 1];
+    for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+    std::vector<std::size_t> end(first.begin(), first.end() - 1);
+    std::vector<Hit> sorted(hits.size());
+    for (const Hit& h : hits) sorted[end[h.x - from]++] = h;
+    hits.swap(sorted);
+    tbb::parallel_for(std::size_t{0}, first.size() - 1, [&](std::size_t i) {
+        std::sort(hits.begin() + static_cast<std::ptrdiff_t>(first[i]),
+                  hits.begin() + static_cast<std::ptrdiff_t>(first[i + 1]), less);
+    });
 }
 
 /// Sets of a node's 26 neighbours as bits; bit 9 (x + 1) + 3 (y + 1) + z + 1, the node itself is bit 13.
@@ -142,8 +163,8 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
     LatticeTopology result;
 
     // Components with a node between two hits of their own.
-    std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
-        return std::tie(a.component, a.x, a.y, a.z) < std::tie(b.component, b.x, b.y, b.z);
+    sort_by_x(hits, [](const Hit& a, const Hit& b) {
+        return std::tie(a.component, a.y, a.z) < std::tie(b.component, b.y, b.z);
     });
     std::vector<char> holds_node(components, 0);
     for (std::size_t h = 0; h + 1 < hits.size();) {
@@ -179,43 +200,54 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
         const bool up = std::abs(beyond) > kOnNode ? beyond > 0.0 : is_inside(nearest) == (way.z() > 0.0);
         hits.push_back({nearest[0], nearest[1], 0, nearest[2] + (up ? 0.5 : -0.5)});
     }
-    std::sort(hits.begin(), hits.end(),
-              [](const Hit& a, const Hit& b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); });
-    std::map<Node, bool> wrong;  // true: the mesh has it inside
+    sort_by_x(hits, [](const Hit& a, const Hit& b) { return std::tie(a.y, a.z) < std::tie(b.y, b.z); });
+    std::vector<Node> wrong;  // ascending
     for (std::size_t h = 0; h + 1 < hits.size();) {
         const Hit &a = hits[h], &b = hits[h + 1];
         if (std::tie(a.x, a.y) != std::tie(b.x, b.y)) {
             ++h;
             continue;
         }
-        for (int z = static_cast<int>(std::ceil(a.z)); z <= b.z; ++z) {
-            const Node n = {a.x, a.y, z};
-            wrong[n] = !is_inside(n);
-        }
+        for (int z = static_cast<int>(std::ceil(a.z)); z <= b.z; ++z)
+            if (wrong.empty() || wrong.back() < Node{a.x, a.y, z}) wrong.push_back({a.x, a.y, z});
         h += 2;
     }
-    for (bool any = true; any;) {
-        any = false;
-        for (auto it = wrong.begin(); it != wrong.end();) {
-            const Node n = it->first;
-            std::uint32_t inside = 0;
+
+    // The sides of the nodes around each as the mesh has them, and which of those are wrong.
+    struct Around {
+        std::uint32_t inside = 0;
+        int wrong[27];
+    };
+    std::vector<Around> around(wrong.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, wrong.size(), 64), [&](const auto& range) {
+        const auto own_probe = surface.probe();
+        for (std::size_t w = range.begin(); w < range.end(); ++w)
             for (int x = -1; x <= 1; ++x)
                 for (int y = -1; y <= 1; ++y)
                     for (int z = -1; z <= 1; ++z) {
-                        const Node m = {n[0] + x, n[1] + y, n[2] + z};
-                        const auto found = wrong.find(m);
-                        if (found != wrong.end() ? found->second : is_inside(m))
-                            inside |= 1u << bit_of(x, y, z);
+                        const Node m = {wrong[w][0] + x, wrong[w][1] + y, wrong[w][2] + z};
+                        const auto at = std::lower_bound(wrong.begin(), wrong.end(), m);
+                        const bool is_wrong = at != wrong.end() && *at == m;
+                        const bool inside = own_probe->value(lattice * Vec3(m[0], m[1], m[2])) < 0.0;
+                        if (inside != is_wrong) around[w].inside |= 1u << bit_of(x, y, z);
+                        around[w].wrong[bit_of(x, y, z)] =
+                            is_wrong ? static_cast<int>(at - wrong.begin()) : -1;
                     }
-            if (is_simple(inside)) {
-                it = wrong.erase(it);
-                any = true;
-            } else {
-                ++it;
-            }
+    });
+    std::vector<char> put_right(wrong.size(), 0);
+    for (bool any = true; any;) {
+        any = false;
+        for (std::size_t w = 0; w < wrong.size(); ++w) {
+            if (put_right[w] || !is_simple(around[w].inside)) continue;
+            put_right[w] = 1;
+            any = true;
+            for (int bit = 0; bit < 27; ++bit)  // bit 26 - b is the way back
+                if (const int other = around[w].wrong[bit]; other >= 0)
+                    around[other].inside ^= 1u << (26 - bit);
         }
     }
-    for (const auto& [n, by_mesh] : wrong) result.faults.push_back(lattice * Vec3(n[0], n[1], n[2]));
+    for (std::size_t w = 0; w < wrong.size(); ++w)
+        if (!put_right[w]) result.faults.push_back(lattice * Vec3(wrong[w][0], wrong[w][1], wrong[w][2]));
     return result;
 }
 

@@ -1,6 +1,9 @@
 #include "isotrack/sampling/cover.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -18,61 +21,6 @@ constexpr double kGrazing = 0.01, kHere = 0.1;  // kHere: resolutions
 constexpr double kLargestSeed =
     5.0;  // resolutions: a first spacing above this would step over small features
 
-/// Crossings in cells of a regular grid, sorted by cell, so that those within a distance of a point can be
-/// visited.
-class CrossingGrid {
-public:
-    CrossingGrid(const std::vector<Surface::Crossing>& crossings, double cell_size)
-        : crossings_(crossings), cell_size_(cell_size) {
-        Box box;
-        for (const auto& c : crossings) box.extend(c.point);
-        origin_ = box.min();
-        for (int axis = 0; axis < 3; ++axis)
-            size_[axis] = static_cast<std::int64_t>(box.sizes()[axis] / cell_size) + 1;
-        keyed_.reserve(crossings.size());
-        for (std::size_t i = 0; i < crossings.size(); ++i)
-            keyed_.push_back({key(cell(crossings[i].point)), static_cast<int>(i)});
-        std::sort(keyed_.begin(), keyed_.end());
-    }
-
-    template <typename Visit>
-    void for_each_within(const Vec3& p, double radius, const Visit& visit) const {
-        const auto low = cell(p - Vec3::Constant(radius)), high = cell(p + Vec3::Constant(radius));
-        for (std::int64_t x = std::max<std::int64_t>(low[0], 0); x <= std::min(high[0], size_[0] - 1); ++x)
-            for (std::int64_t y = std::max<std::int64_t>(low[1], 0); y <= std::min(high[1], size_[1] - 1);
-                 ++y) {
-                const std::int64_t from = std::max<std::int64_t>(low[2], 0),
-                                   to = std::min(high[2], size_[2] - 1);
-                if (from > to) continue;
-                auto it = std::lower_bound(keyed_.begin(), keyed_.end(), Entry{key({x, y, from}), -1});
-                for (; it != keyed_.end() && it->key <= key({x, y, to}); ++it)
-                    if ((crossings_[it->crossing].point - p).squaredNorm() <= radius * radius)
-                        visit(it->crossing);
-            }
-    }
-
-private:
-    using Cell = std::array<std::int64_t, 3>;
-    struct Entry {
-        std::int64_t key;
-        int crossing;
-        bool operator<(const Entry& o) const { return key != o.key ? key < o.key : crossing < o.crossing; }
-    };
-    Cell cell(const Vec3& p) const {
-        Cell c;
-        for (int axis = 0; axis < 3; ++axis)
-            c[axis] = static_cast<std::int64_t>(std::floor((p[axis] - origin_[axis]) / cell_size_));
-        return c;
-    }
-    std::int64_t key(const Cell& c) const { return (c[0] * size_[1] + c[1]) * size_[2] + c[2]; }
-
-    const std::vector<Surface::Crossing>& crossings_;
-    double cell_size_;
-    Vec3 origin_ = Vec3::Zero();
-    Cell size_{};
-    std::vector<Entry> keyed_;
-};
-
 /// A shuffled order that depends on the seed and the count alone [splitmix64].
 std::uint64_t mix(std::uint64_t x) {
     x += 0x9e3779b97f4a7c15u;
@@ -83,27 +31,29 @@ std::uint64_t mix(std::uint64_t x) {
 
 }  // namespace
 
-std::size_t cover(Particles& particles, const Surface& surface, const SizingLimits& limits,
-                  std::uint64_t seed, Id& next_id) {
-    const std::vector<Surface::Crossing> crossings = surface.crossings();
+std::size_t cover(Particles& particles, const Surface& surface, const CrossingGrid& grid,
+                  const SizingLimits& limits, std::uint64_t seed, Id& next_id) {
+    const std::vector<Surface::Crossing>& crossings = grid.crossings();
     if (crossings.empty()) return 0;
     const double resolution = surface.resolution();
-    const CrossingGrid grid(crossings, 2.0 * resolution);
-    std::vector<char> covered(crossings.size(), 0);
+    std::vector<std::atomic<char>> covered(crossings.size());  // marked by several threads
     const auto mark = [&](const Vec3& p, const Vec3& n, double reach) {
         reach =
             std::max(reach, 1.2 * resolution);  // a crossing lies within a cell's diagonal of its neighbours
         const double off_plane = std::max(kOffPlane * reach, 0.5 * resolution);
-        grid.for_each_within(p, reach, [&](int c) {
-            if (covered[c]) return;
+        grid.for_each_in(Box(p - Vec3::Constant(reach), p + Vec3::Constant(reach)), [&](std::size_t c) {
             const Vec3 way = crossings[c].point - p;
+            if (way.squaredNorm() > reach * reach || std::abs(n.dot(way)) >= off_plane) return;
             const double facing = n.dot(crossings[c].outward.cast<double>());
-            const bool same_side = facing > 0.0 || (facing > -kGrazing && way.norm() < kHere * resolution);
-            if (same_side && std::abs(n.dot(way)) < off_plane) covered[c] = 1;
+            if (facing > 0.0 ||
+                (facing > -kGrazing && way.squaredNorm() < kHere * resolution * kHere * resolution))
+                covered[c].store(1, std::memory_order_relaxed);
         });
     };
-    for (std::size_t i = 0; i < particles.size(); ++i)
-        mark(particles.position[i], particles.normal[i], kReach * particles.spacing[i]);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, particles.size(), 64), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+            mark(particles.position[i], particles.normal[i], kReach * particles.spacing[i]);
+    });
 
     std::vector<int> order;
     for (std::size_t c = 0; c < crossings.size(); ++c)

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "isotrack/sampling/particle_grid.h"
-
 namespace isotrack {
 namespace {
 
@@ -96,11 +94,12 @@ void measure_errors(const FrameMesh& mesh, const Surface& surface, const SizingL
 
 /// Mesh to surface, and some crossings of the surface to the mesh.
 Inspection held_against(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                        const std::vector<Surface::Crossing>& crossings, const Inspection& before) {
+                        const CrossingGrid& grid, const Inspection& before) {
+    const std::vector<Surface::Crossing>& crossings = grid.crossings();
     Inspection result;
     measure_errors(mesh, surface, limits, before, result);
     const auto distances =
-        crossing_distances(mesh.vertices, mesh.carved.triangles, crossings, kLostAt * limits.tolerance);
+        crossing_distances(mesh.vertices, mesh.carved.triangles, grid, kLostAt * limits.tolerance);
     double sum = 0.0;
     for (std::size_t c = 0; c < crossings.size(); ++c) {
         if (!(distances[c] <= kCertified * limits.tolerance)) result.missed.push_back(crossings[c]);
@@ -120,22 +119,23 @@ Inspection held_against(const FrameMesh& mesh, const Surface& surface, const Siz
 
 Inspection inspect_again(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
                          const Inspection& before) {
-    return held_against(mesh, surface, limits, before.missed, before);
+    return held_against(mesh, surface, limits, CrossingGrid(before.missed, 2.0 * surface.resolution()),
+                        before);
 }
 
 Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                   const std::vector<Surface::Crossing>& crossings, const Inspection& before) {
+                   const CrossingGrid& crossings, const Inspection& before) {
     Inspection result = held_against(mesh, surface, limits, crossings, before);
-    result.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, surface, crossings);
-    if (result.topology.faults.empty()) return result;
-    const double near = kFaultReach * surface.resolution();
-    PointGrid faults(near);
-    for (const Vec3& f : result.topology.faults) faults.insert(f, 0);
-    for (const auto& c : crossings) {
-        bool doubtful = false;
-        faults.for_each_within(c.point, near, [&](int, double) { doubtful = true; });
-        if (doubtful) result.doubtful.push_back(c.point);
-    }
+    result.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, surface, crossings.crossings());
+    const Vec3 near = Vec3::Constant(kFaultReach * surface.resolution());
+    std::vector<std::size_t> doubtful;
+    for (const Vec3& fault : result.topology.faults)
+        crossings.for_each_in(Box(fault - near, fault + near), [&](std::size_t c) {
+            if ((crossings.crossings()[c].point - fault).norm() <= near.x()) doubtful.push_back(c);
+        });
+    std::sort(doubtful.begin(), doubtful.end());
+    doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
+    for (const std::size_t c : doubtful) result.doubtful.push_back(crossings.crossings()[c].point);
     return result;
 }
 

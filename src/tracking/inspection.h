@@ -36,7 +36,7 @@ struct Inspection {
 
 /// Both ways, and the topology. Errors of triangles that `before` has, too, are taken over.
 Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                   const std::vector<Surface::Crossing>& crossings, const Inspection& before);
+                   const CrossingGrid& crossings, const Inspection& before);
 
 /// Mesh to surface, and only those crossings that `before` missed.
 Inspection inspect_again(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,

@@ -355,15 +355,15 @@ struct Tracker::Impl {
     void follow(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
     void remember(const FrameMesh& mesh);
     void remember_errors(const FrameMesh& mesh, const std::vector<TriangleError>& errors);
-    void sample(const Surface& surface, const SizingLimits& l,
-                const std::vector<Surface::Crossing>& crossings, bool warm, TrackedFrame& frame);
+    void sample(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings, bool warm,
+                TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     TrackedFrame advance(const Surface& surface, const Motion& motion);
 };
 
 /// Rounds of: mesh, measure, size, relax, births and deaths. More of them the more particles are new.
-void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l,
-                           const std::vector<Surface::Crossing>& crossings, bool warm, TrackedFrame& frame) {
+void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings,
+                           bool warm, TrackedFrame& frame) {
     auto& seconds = frame.seconds;
     const double fresh =
         particles.empty() ? 0.0 : static_cast<double>(frame.seeded) / static_cast<double>(particles.size());
@@ -463,11 +463,13 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         const StageTimer timer(seconds, "carry");
         frame.lost = carry(surface, motion);
     }
+    std::optional<CrossingGrid> found;
     {
         const StageTimer timer(seconds, "cover");
-        frame.seeded = cover(particles, surface, l, options.seed, next_id);
+        found.emplace(surface);
+        frame.seeded = cover(particles, surface, *found, l, options.seed, next_id);
     }
-    const std::vector<Surface::Crossing> crossings = surface.crossings();
+    const CrossingGrid& crossings = *found;
     if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
     else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))

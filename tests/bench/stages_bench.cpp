@@ -12,6 +12,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -57,7 +58,7 @@ struct Scene {
     Tetrahedra cells;
     CarvedSurface carved;
     TriangleMesh mesh;
-    std::vector<Surface::Crossing> crossings;
+    std::optional<CrossingGrid> crossings;
 };
 
 Scene make_scene(const std::string& shape, std::size_t count) {
@@ -69,7 +70,7 @@ Scene make_scene(const std::string& shape, std::size_t count) {
         s.limits = uniform(spacing);
         s.seeded.clear();
         Id next_id = 0;
-        cover(s.seeded, *s.surface, s.limits, 1, next_id);
+        cover(s.seeded, *s.surface, CrossingGrid(*s.surface), s.limits, 1, next_id);
         const double ratio = static_cast<double>(s.seeded.size()) / static_cast<double>(count);
         if (ratio > 0.95 && ratio < 1.05) break;
         spacing *= std::sqrt(ratio);
@@ -88,7 +89,7 @@ Scene make_scene(const std::string& shape, std::size_t count) {
     for (const int p : s.carved.particle)
         s.mesh.points.push_back(p >= 0 ? s.particles.position[p] : s.carved.midpoints[midpoint++]);
     s.mesh.triangles = s.carved.triangles;
-    s.crossings = s.surface->crossings();
+    s.crossings.emplace(*s.surface);
     return s;
 }
 
@@ -150,7 +151,7 @@ void cover_all(benchmark::State& state, const Scene& s) {
     for (auto _ : state) {
         particles.clear();
         Id next_id = 0;
-        cover(particles, *s.surface, s.limits, 1, next_id);
+        cover(particles, *s.surface, CrossingGrid(*s.surface), s.limits, 1, next_id);
     }
     count_items(state, particles.size());
 }
@@ -209,9 +210,9 @@ void distances(benchmark::State& state, const Scene& s) {
     std::vector<double> result;
     for (auto _ : state)
         result =
-            crossing_distances(s.mesh.points, s.mesh.triangles, s.crossings, 1.5 * s.surface->resolution());
+            crossing_distances(s.mesh.points, s.mesh.triangles, *s.crossings, 1.5 * s.surface->resolution());
     count_items(state, s.mesh.triangles.size());
-    state.counters["crossings"] = static_cast<double>(s.crossings.size());
+    state.counters["crossings"] = static_cast<double>(s.crossings->crossings().size());
     state.counters["max_error_vx"] =
         *std::max_element(result.begin(), result.end()) / s.surface->resolution();
 }

@@ -156,7 +156,7 @@ TEST(Measure, AgreesWithDistancesToEveryTriangle) {
         c.outward.setZero();  // the nearest triangle, whichever way it faces
     }
     double largest = 0.0, squares = 0.0;
-    for (const double d : crossing_distances(mesh.points, mesh.triangles, crossings, 1.0)) {
+    for (const double d : crossing_distances(mesh.points, mesh.triangles, CrossingGrid(crossings, 0.06), 1.0)) {
         largest = std::max(largest, d);
         squares += d * d;
     }

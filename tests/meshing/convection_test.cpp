@@ -41,7 +41,7 @@ struct Samples {
         limits.angle = 0.7;
         limits.min_edge = limits.max_edge = edge;
         Id next_id = 0;
-        cover(particles, surface, limits, seed, next_id);
+        cover(particles, surface, CrossingGrid(surface), limits, seed, next_id);
         cells = tetrahedralise(particles.position);
     }
 };
@@ -404,10 +404,11 @@ TEST(CrossingDistances, AreExactUpToTheCutoffAndInfiniteBeyond) {
     const auto surface =
         shapes::unite({shapes::sphere({-1, 0, 0}, 0.5, 0.1), shapes::sphere({1, 0.2, 0}, 0.6, 0.1)});
     const TriangleMesh mesh = support::icosphere(1, {-1, 0, 0}, 0.5);
-    const auto crossings = surface->crossings();
+    const CrossingGrid grid(*surface);
+    const auto& crossings = grid.crossings();
     ASSERT_GT(crossings.size(), 500u);
     for (const double cutoff : {0.005, 0.05, 0.9}) {
-        const auto distances = crossing_distances(mesh.points, mesh.triangles, crossings, cutoff);
+        const auto distances = crossing_distances(mesh.points, mesh.triangles, grid, cutoff);
         ASSERT_EQ(distances.size(), crossings.size());
         std::size_t finite = 0;
         for (std::size_t i = 0; i < crossings.size(); ++i) {
@@ -436,9 +437,9 @@ TEST(CrossingDistances, AreExactUpToTheCutoffAndInfiniteBeyond) {
 }
 
 TEST(CrossingDistances, AreInfiniteWithoutAMesh) {
-    const auto crossings = shapes::sphere({0, 0, 0}, 1.0, 0.2)->crossings();
-    for (const double d : crossing_distances({}, {}, crossings, 1.0)) EXPECT_TRUE(std::isinf(d));
-    EXPECT_TRUE(crossing_distances({}, {}, {}, 1.0).empty());
+    const CrossingGrid grid(*shapes::sphere({0, 0, 0}, 1.0, 0.2));
+    for (const double d : crossing_distances({}, {}, grid, 1.0)) EXPECT_TRUE(std::isinf(d));
+    EXPECT_TRUE(crossing_distances({}, {}, CrossingGrid({}, 1.0), 1.0).empty());
 }
 
 /// Mean of the signed distance to the unit sphere over the area of a mesh.

@@ -59,7 +59,8 @@ TEST(Cover, LeavesNoCrossingFarFromAParticleThatFacesItsWay) {
     const auto surface = shapes::torus({0.01, 0.02, 0.03}, 1.0, 0.3, 0.05);
     Particles particles;
     Id next_id = 10;
-    const std::size_t added = cover(particles, *surface, limits_of(kEdge), 1, next_id);
+    const std::size_t added =
+        cover(particles, *surface, CrossingGrid(*surface), limits_of(kEdge), 1, next_id);
     EXPECT_EQ(added, particles.size());
     EXPECT_EQ(next_id, static_cast<Id>(10 + added));
     EXPECT_EQ(std::set<Id>(particles.id.begin(), particles.id.end()).size(), added);
@@ -83,8 +84,8 @@ TEST(Cover, AddsNothingTheSecondTime) {
           shapes::plate({0, 0, 0}, 1.0, 0.1, 0.05), shapes::shell({0.01, 0, 0}, 1.0, 0.3, 0.05)}) {
         Particles particles;
         Id next_id = 0;
-        EXPECT_GT(cover(particles, *surface, limits_of(0.2), 1, next_id), 0u);
-        EXPECT_EQ(cover(particles, *surface, limits_of(0.2), 1, next_id), 0u);
+        EXPECT_GT(cover(particles, *surface, CrossingGrid(*surface), limits_of(0.2), 1, next_id), 0u);
+        EXPECT_EQ(cover(particles, *surface, CrossingGrid(*surface), limits_of(0.2), 1, next_id), 0u);
     }
 }
 
@@ -93,9 +94,9 @@ TEST(Cover, PutsNoTwoParticlesOnOnePlace) {
     const auto surface = shapes::shell({0, 0, 0}, 1.0, 0.3, 0.05);
     Particles particles;
     Id next_id = 0;
-    cover(particles, *surface, limits_of(0.12), 1, next_id);
+    cover(particles, *surface, CrossingGrid(*surface), limits_of(0.12), 1, next_id);
     for (std::size_t i = 0; i < particles.size(); ++i) ASSERT_GT(nearest_distance(particles, i), 0.01);
-    EXPECT_EQ(cover(particles, *surface, limits_of(0.12), 1, next_id), 0u);
+    EXPECT_EQ(cover(particles, *surface, CrossingGrid(*surface), limits_of(0.12), 1, next_id), 0u);
 }
 
 TEST(Cover, FindsEveryPartFromAColdStart) {
@@ -109,7 +110,7 @@ TEST(Cover, FindsEveryPartFromAColdStart) {
         SizingLimits limits = limits_of(0.1);
         limits.min_edge = 0.5 * h;
         limits.max_edge = 2.0;
-        cover(particles, *surface, limits, seed, next_id);
+        cover(particles, *surface, CrossingGrid(*surface), limits, seed, next_id);
         int sphere = 0, torus = 0, drop = 0;
         for (const Vec3& p : particles.position)
             ++((p - Vec3(1.5, 0.3, 0)).norm() < 3 * h ? drop : p.z() > 1.0 ? torus : sphere);
@@ -131,21 +132,22 @@ TEST(Cover, FindsADropOfASingleVoxel) {
     Id next_id = 0;
     SizingLimits limits = limits_of(0.1);
     limits.min_edge = 0.025;
-    EXPECT_GE(cover(particles, level_set, limits, 1, next_id), 4u);  // enough for a tetrahedron
+    EXPECT_GE(cover(particles, level_set, CrossingGrid(level_set), limits, 1, next_id),
+              4u);  // enough for a tetrahedron
 }
 
 TEST(Cover, MendsOnlyTheHole) {
     const auto surface = shapes::sphere({0.01, 0.02, 0.03}, 1.0, 0.05);
     Particles particles;
     Id next_id = 0;
-    cover(particles, *surface, limits_of(0.15), 1, next_id);
+    cover(particles, *surface, CrossingGrid(*surface), limits_of(0.15), 1, next_id);
     const std::size_t before = particles.size();
     std::vector<char> keep(before, 1);
     for (std::size_t i = 0; i < before; ++i) keep[i] = particles.position[i].x() < 0.8;
     particles.retain(keep);
     const std::size_t left = particles.size();
     ASSERT_LT(left, before);
-    const std::size_t added = cover(particles, *surface, limits_of(0.15), 1, next_id);
+    const std::size_t added = cover(particles, *surface, CrossingGrid(*surface), limits_of(0.15), 1, next_id);
     EXPECT_GT(added, 0u);
     EXPECT_LE(added, 2 * (before - left));
     for (std::size_t i = left; i < particles.size(); ++i) {
@@ -159,12 +161,12 @@ TEST(Cover, DoesNotLetOneSideOfASheetStandForTheOther) {
     const auto plate = shapes::plate({0, 0, 0}, 1.0, 2.0 * h, h);
     Particles particles;
     Id next_id = 0;
-    cover(particles, *plate, limits_of(0.3), 1, next_id);
+    cover(particles, *plate, CrossingGrid(*plate), limits_of(0.3), 1, next_id);
     std::vector<char> keep(particles.size());
     for (std::size_t i = 0; i < particles.size(); ++i) keep[i] = particles.normal[i].z() > -0.5;
     particles.retain(keep);
     const std::size_t left = particles.size();
-    cover(particles, *plate, limits_of(0.3), 1, next_id);
+    cover(particles, *plate, CrossingGrid(*plate), limits_of(0.3), 1, next_id);
     std::size_t below = 0;
     for (std::size_t i = left; i < particles.size(); ++i) below += particles.normal[i].z() < -0.5;
     EXPECT_GT(below, 20u);
@@ -242,7 +244,7 @@ TEST(Relax, GivesTheSameBitsAtAnyThreadCount) {
         const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
         Particles particles;
         Id next_id = 0;
-        cover(particles, *torus, limits_of(0.12), 1, next_id);
+        cover(particles, *torus, CrossingGrid(*torus), limits_of(0.12), 1, next_id);
         for (int round = 0; round < 3; ++round) relax(particles, adjacency_of(particles), *torus, 4);
         return particles;
     };
@@ -558,7 +560,7 @@ TEST(CoordinateDescent, SpreadsParticlesOverAnEllipsoidByItsCurvature) {
     limits.max_edge = 1.0;
     Particles particles;
     Id next_id = 0;
-    cover(particles, *ellipsoid, limits, 1, next_id);
+    cover(particles, *ellipsoid, CrossingGrid(*ellipsoid), limits, 1, next_id);
     const Id first_new = next_id;
     const std::size_t start = particles.size();
     DelaunayNeighbours structure(particles.position);

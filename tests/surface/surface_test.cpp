@@ -8,9 +8,11 @@
 #include <limits>
 #include <memory>
 #include <random>
+#include <set>
 #include <utility>
 #include <vector>
 
+#include "isotrack/surface/crossing_grid.h"
 #include "isotrack/surface/shapes.h"
 
 namespace isotrack {
@@ -245,6 +247,31 @@ TEST(Crossings, SeeEveryPartWiderThanALatticeCell) {
         for (const auto& c : surface->crossings()) found += (c.point - centre).norm() < 2.0 * kResolution;
         EXPECT_GE(found, 6u);
     }
+}
+
+TEST(CrossingGrid, FindsWhatIsInABoxAndNothingElse) {
+    const auto surface =
+        shapes::unite({shapes::sphere({0, 0, 0}, 1.0, 0.1), shapes::sphere({9, 5, -4}, 0.3, 0.1)});
+    const auto all = surface->crossings();
+    for (const double width : {0.01, 0.2, 100.0}) {
+        const CrossingGrid grid(all, width);
+        ASSERT_EQ(grid.crossings().size(), all.size());
+        for (const Box& box :
+             {Box(Vec3(-0.5, -0.2, 0.3), Vec3(0.4, 0.9, 1.2)), Box(Vec3(-9, -9, -9), Vec3(99, 99, 99)),
+              Box(Vec3(8.9, 4, -5), Vec3(9.1, 6, -3)), Box(Vec3(3, 3, 3), Vec3(4, 4, 4)),
+              Box(Vec3(-50, -1, -1), Vec3(-40, 1, 1))}) {
+            std::size_t expected = 0, found = 0;
+            for (const auto& c : all) expected += box.contains(c.point);
+            std::set<std::size_t> seen;
+            grid.for_each_in(box, [&](std::size_t c) {
+                EXPECT_TRUE(box.contains(grid.crossings()[c].point));
+                EXPECT_TRUE(seen.insert(c).second);
+                ++found;
+            });
+            EXPECT_EQ(found, expected);
+        }
+    }
+    CrossingGrid({}, 1.0).for_each_in(Box(Vec3(-1, -1, -1), Vec3(1, 1, 1)), [](std::size_t) { FAIL(); });
 }
 
 }  // namespace

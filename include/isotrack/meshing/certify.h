@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "isotrack/delaunay/tetrahedralisation.h"
-#include "isotrack/surface/surface.h"
+#include "isotrack/surface/crossing_grid.h"
 #include "isotrack/types.h"
 
 namespace isotrack {
@@ -37,10 +37,10 @@ std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec
 
 /// Distance of every lattice crossing of the surface to the nearest triangle that faces its way (unit normal
 /// . outward >= -0.2, since a crossed edge may lie nearly in the surface), so that one side of a thin sheet
-/// does not stand for the other. In the order of `crossings`, world units. Exact up to `cutoff`; beyond it
+/// does not stand for the other. In the order of `grid`, world units. Exact up to `cutoff`; beyond it
 /// the entry is infinite.
 std::vector<double> crossing_distances(const std::vector<Vec3>& points,
-                                       const std::vector<Triangle>& triangles,
-                                       const std::vector<Surface::Crossing>& crossings, double cutoff);
+                                       const std::vector<Triangle>& triangles, const CrossingGrid& grid,
+                                       double cutoff);
 
 }  // namespace isotrack
