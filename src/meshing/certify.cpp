@@ -1,5 +1,6 @@
 #include "isotrack/meshing/certify.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 
 #include "delaunay/circumcentre.h"
 
@@ -66,8 +68,9 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps, double refine_above) {
     std::vector<TriangleError> errors(triangles.size());
+    tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
-        const auto probe = surface.probe();
+        Surface::Probe& probe = *probes.local();
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
             const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
                        &c = points[triangles[t][2]];
@@ -77,7 +80,7 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
             for (int i = 0; i <= steps; ++i)
                 for (int j = 0; i + j <= steps; ++j) {
                     const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
-                    const double value = std::abs(probe->value(a + u * (b - a) + v * (c - a)));
+                    const double value = std::abs(probe.value(a + u * (b - a) + v * (c - a)));
                     error.mean_square += value * value;
                     ++count;
                     if (value <= error.largest) continue;
@@ -86,7 +89,7 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                     best_v = v;
                 }
             if (error.largest > refine_above)
-                climb(*probe, a, b - a, c - a, 0.5 / steps, best_u, best_v, error.largest);
+                climb(probe, a, b - a, c - a, 0.5 / steps, best_u, best_v, error.largest);
             error.where = a + best_u * (b - a) + best_v * (c - a);
             error.mean_square /= count;
         }

@@ -1,9 +1,11 @@
 #include "isotrack/meshing/convection.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <numeric>
 
 #include "delaunay/circumcentre.h"
@@ -41,8 +43,9 @@ void update_labels(CellLabels& labels, const std::vector<int>& changed, const Te
                    const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
                    const Surface& surface) {
     labels.resize(cells.size(), kOutside);
+    tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, changed.size(), 512), [&](const auto& range) {
-        const auto probe = surface.probe();
+        Surface::Probe& probe = *probes.local();
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             const int c = changed[i];
             const auto& v = cells.vertices[c];
@@ -54,7 +57,7 @@ void update_labels(CellLabels& labels, const std::vector<int>& changed, const Te
                     one_sheet = one_sheet && normals[v[a]].dot(normals[v[b]]) >= 0.0;
             const Vec3& p0 = points[v[0]];
             const Vec3 e1 = points[v[1]] - p0, e2 = points[v[2]] - p0, e3 = points[v[3]] - p0;
-            const Surface::Sample centroid = probe->sample(p0 + 0.25 * (e1 + e2 + e3));
+            const Surface::Sample centroid = probe.sample(p0 + 0.25 * (e1 + e2 + e3));
             double value = centroid.value;
             if (one_sheet && centroid.gradient.norm() > kClear) {
                 Vec3 centre;
@@ -62,7 +65,7 @@ void update_labels(CellLabels& labels, const std::vector<int>& changed, const Te
                     labels[c] = kFlat;
                     continue;
                 }
-                value = probe->value(p0 + centre);
+                value = probe.value(p0 + centre);
             }
             labels[c] = value < 0.0 ? kInside : kOutside;
         }

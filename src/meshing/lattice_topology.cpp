@@ -1,11 +1,13 @@
 #include "isotrack/meshing/lattice_topology.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <numeric>
 #include <tuple>
 
@@ -219,8 +221,9 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
         int wrong[27];
     };
     std::vector<Around> around(wrong.size());
+    tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, wrong.size(), 64), [&](const auto& range) {
-        const auto own_probe = surface.probe();
+        Surface::Probe& own_probe = *probes.local();
         for (std::size_t w = range.begin(); w < range.end(); ++w)
             for (int x = -1; x <= 1; ++x)
                 for (int y = -1; y <= 1; ++y)
@@ -228,7 +231,7 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
                         const Node m = {wrong[w][0] + x, wrong[w][1] + y, wrong[w][2] + z};
                         const auto at = std::lower_bound(wrong.begin(), wrong.end(), m);
                         const bool is_wrong = at != wrong.end() && *at == m;
-                        const bool inside = own_probe->value(lattice * Vec3(m[0], m[1], m[2])) < 0.0;
+                        const bool inside = own_probe.value(lattice * Vec3(m[0], m[1], m[2])) < 0.0;
                         if (inside != is_wrong) around[w].inside |= 1u << bit_of(x, y, z);
                         around[w].wrong[bit_of(x, y, z)] =
                             is_wrong ? static_cast<int>(at - wrong.begin()) : -1;

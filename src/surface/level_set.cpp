@@ -60,24 +60,57 @@ struct AffineMap {
     Vec3 gradient_to_world(const Vec3& index_gradient) const { return inverse.transpose() * index_gradient; }
 };
 
+/// Values at lattice nodes, through the leaves met lately: neighbouring leaves have places of their own.
+class NodeValues {
+public:
+    explicit NodeValues(const FloatTree& tree) : tree_(tree) {}
+
+    /// The values of the leaf that holds a node, at `offset`; nullptr in a tile.
+    const float* leaf(const Coord& node) {
+        const int x = node.x() >> Leaf::LOG2DIM, y = node.y() >> Leaf::LOG2DIM, z = node.z() >> Leaf::LOG2DIM;
+        Place& place = places_[((x & 3) << 4) | ((y & 3) << 2) | (z & 3)];
+        if (!place.used || place.leaf != Coord(x, y, z)) {
+            const Leaf* found = tree_.probeConstLeaf(node);
+            place = {true, Coord(x, y, z), found ? found->buffer().data() : nullptr};
+        }
+        return place.values;
+    }
+    float at(const Coord& node) {
+        const float* values = leaf(node);
+        constexpr int kMask = kLeafDim - 1;
+        return values ? values[offset(node.x() & kMask, node.y() & kMask, node.z() & kMask)]
+                      : tree_.getValue(node);
+    }
+    static int offset(int x, int y, int z) { return (x << (2 * Leaf::LOG2DIM)) + (y << Leaf::LOG2DIM) + z; }
+
+private:
+    struct Place {
+        bool used = false;
+        Coord leaf;  // in leaves
+        const float* values = nullptr;
+    };
+    const FloatTree& tree_;
+    Place places_[64];
+};
+
 /// Values around one lattice cell. The cell's corners are (0..1)^3; the values one further out in each axis
 /// are those that the central differences at the corners need.
 class Stencil {
 public:
-    explicit Stencil(const FloatTree& tree) : accessor_(tree) {}
+    explicit Stencil(const FloatTree& tree) : nodes_(tree) {}
 
     double value(const Vec3& index) {
         Vec3 t;
         const Coord base = split(index, t);
         float v[2][2][2];
         const int x = base.x() & (kLeafDim - 1), y = base.y() & (kLeafDim - 1), z = base.z() & (kLeafDim - 1);
-        const Leaf* leaf = nullptr;
-        if (x < kLeafDim - 1 && y < kLeafDim - 1 && z < kLeafDim - 1) leaf = accessor_.probeConstLeaf(base);
+        const float* leaf = nullptr;
+        if (x < kLeafDim - 1 && y < kLeafDim - 1 && z < kLeafDim - 1) leaf = nodes_.leaf(base);
         for (int i = 0; i < 2; ++i)
             for (int j = 0; j < 2; ++j)
                 for (int k = 0; k < 2; ++k)
-                    v[i][j][k] = leaf ? leaf->getValue(offset(x + i, y + j, z + k))
-                                      : accessor_.getValue(base.offsetBy(i, j, k));
+                    v[i][j][k] = leaf ? leaf[NodeValues::offset(x + i, y + j, z + k)]
+                                      : nodes_.at(base.offsetBy(i, j, k));
         const auto mix = [](double a, double b, double s) { return a + s * (b - a); };
         double planes[2];
         for (int i = 0; i < 2; ++i)
@@ -109,10 +142,6 @@ public:
     }
 
 private:
-    static openvdb::Index offset(int x, int y, int z) {
-        return (x << (2 * Leaf::LOG2DIM)) + (y << Leaf::LOG2DIM) + z;
-    }
-
     static Coord split(const Vec3& index, Vec3& t) {
         // Points far outside any grid, or not finite, read the background at a corner of the representable
         // range.
@@ -130,23 +159,23 @@ private:
     void gather(const Coord& base, float (&v)[4][4][4]) {
         const int x = base.x() & (kLeafDim - 1), y = base.y() & (kLeafDim - 1), z = base.z() & (kLeafDim - 1);
         const auto inner = [](int c) { return c >= 1 && c <= kLeafDim - 3; };
-        const Leaf* leaf = inner(x) && inner(y) && inner(z) ? accessor_.probeConstLeaf(base) : nullptr;
+        const float* leaf = inner(x) && inner(y) && inner(z) ? nodes_.leaf(base) : nullptr;
         for (int i = 0; i < 4; ++i)
             for (int j = 0; j < 4; ++j) {
                 const int outer = (i == 0 || i == 3) + (j == 0 || j == 3);
                 if (outer == 2) continue;
                 const int first = outer == 0 ? 0 : 1, last = outer == 0 ? 4 : 3;
                 if (leaf) {
-                    const float* line = leaf->buffer().data() + offset(x + i - 1, y + j - 1, z - 1);
+                    const float* line = leaf + NodeValues::offset(x + i - 1, y + j - 1, z - 1);
                     for (int k = first; k < last; ++k) v[i][j][k] = line[k];
                 } else {
                     for (int k = first; k < last; ++k)
-                        v[i][j][k] = accessor_.getValue(base.offsetBy(i - 1, j - 1, k - 1));
+                        v[i][j][k] = nodes_.at(base.offsetBy(i - 1, j - 1, k - 1));
                 }
             }
     }
 
-    Accessor accessor_;
+    NodeValues nodes_;
 };
 
 /// A lattice edge that crosses the surface: from `from`, `fraction` of a voxel along `axis`.
@@ -244,8 +273,8 @@ double slope_at_surface(const FloatTree& tree, const AffineMap& map,
 
 /// World units per grid unit for a measured slope: exact where the unit is recognised.
 double value_scale_for(double slope, double voxel_size, bool level_set) {
-    // Central differences across sheets of a voxel or two are too short: what says it holds distances is believed
-    // for longer.
+    // Central differences across sheets of a voxel or two are too short: what says it holds distances is
+    // believed for longer.
     const double recognised = std::log(level_set ? 2.5 : 1.25);
     if (!(slope > 0.0)) return 1.0;
     const double off_world = std::abs(std::log(slope)), off_voxels = std::abs(std::log(slope * voxel_size));

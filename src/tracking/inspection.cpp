@@ -11,8 +11,7 @@ constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's 
 constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
 constexpr double kLostAt = 3.0;      // tolerances
 constexpr double kFaultReach = 1.5;  // resolutions
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
-constexpr double kLeastAngle = 22.0 * kDegree, kLeastFittedAngle = 18.0 * kDegree;
+constexpr double kLargestCotangent = 2.4751, kLargestFittedCotangent = 3.0777;  // of 22 and 18 degrees
 constexpr double kSmooth =
     0.7;  // cosine between the normals of a triangle's corners, for its angles to matter
 constexpr double kAnglesFrom = 1.0;  // resolutions: longest edge of such a triangle
@@ -31,11 +30,10 @@ Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
     return result;
 }
 
-double smallest_angle(const Vec3& p, const Vec3& q, const Vec3& r) {
+/// Whether the smallest angle is below the one with this cotangent.
+bool is_sharp(const Vec3& p, const Vec3& q, const Vec3& r, double cotangent) {
     const Vec3 u = q - p, v = r - q, w = p - r;
-    const double area2 = u.cross(v).norm();
-    return std::min(
-        {std::atan2(area2, -u.dot(w)), std::atan2(area2, -v.dot(u)), std::atan2(area2, -w.dot(v))});
+    return std::max({-u.dot(w), -v.dot(u), -w.dot(v)}) > cotangent * u.cross(v).norm();
 }
 
 /// On smooth surface, not tiny, and with too small an angle, before the fit or after it.
@@ -43,8 +41,8 @@ bool is_needle(const FrameMesh& mesh, const Particles& particles, std::size_t tr
                const Triangle& corner, double resolution) {
     const auto& [i, j, k] = mesh.carved.triangles[triangle];
     const auto& at = particles.position;
-    if (smallest_angle(at[corner[0]], at[corner[1]], at[corner[2]]) >= kLeastAngle &&
-        smallest_angle(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]) >= kLeastFittedAngle)
+    if (!is_sharp(at[corner[0]], at[corner[1]], at[corner[2]], kLargestCotangent) &&
+        !is_sharp(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k], kLargestFittedCotangent))
         return false;
     double longest = 0.0;
     for (int e = 0; e < 3; ++e) {
