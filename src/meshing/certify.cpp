@@ -157,13 +157,13 @@ private:
 
 }  // namespace
 
-std::vector<double> crossing_distances(const std::vector<Vec3>& points,
-                                       const std::vector<Triangle>& triangles, const CrossingGrid& grid,
-                                       double cutoff) {
+void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                        const CrossingGrid& grid, double cutoff, std::vector<double>& distances) {
     const std::vector<Surface::Crossing>& crossings = grid.crossings();
     std::vector<LeastSquare> least(crossings.size());
-    // Looks `reach` far for the crossings that have nothing within `found` yet.
-    const auto search = [&](double reach, double found) {
+    std::vector<char> wanted(crossings.size());
+    for (std::size_t i = 0; i < crossings.size(); ++i) wanted[i] = distances[i] == kUnknownDistance;
+    const auto search = [&](double reach) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
             for (std::size_t t = range.begin(); t < range.end(); ++t) {
                 const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
@@ -173,28 +173,35 @@ std::vector<double> crossing_distances(const std::vector<Vec3>& points,
                 box.min().array() -= reach;
                 box.max().array() += reach;
                 grid.for_each_in(box, [&](std::size_t i) {
-                    const double known = least[i].get();
-                    if (known <= found * found) return;
+                    if (!wanted[i]) return;
                     const double off_plane = normal.dot(crossings[i].point - a);
-                    if (off_plane * off_plane > std::min(reach * reach, known)) return;
+                    if (off_plane * off_plane > std::min(reach * reach, least[i].get())) return;
                     if (normal.dot(crossings[i].outward.cast<double>()) < kFacing) return;
                     least[i].take(squared_distance(crossings[i].point, a, b, c));
                 });
             }
         });
+        bool any = false;
+        for (std::size_t i = 0; i < crossings.size(); ++i) {
+            wanted[i] = wanted[i] && least[i].get() > reach * reach;
+            any = any || wanted[i];
+        }
+        return any;
     };
     // Most are near.
     constexpr double kNear = 0.4;
-    search(kNear * cutoff, 0.0);
-    const auto beyond = [&](double distance) {
-        return [distance](const LeastSquare& l) { return l.get() > distance * distance; };
-    };
-    if (std::any_of(least.begin(), least.end(), beyond(kNear * cutoff))) search(cutoff, kNear * cutoff);
-    std::vector<double> result;
-    result.reserve(least.size());
-    for (const LeastSquare& l : least)
-        result.push_back(beyond(cutoff)(l) ? std::numeric_limits<double>::infinity() : std::sqrt(l.get()));
-    return result;
+    if (std::find(wanted.begin(), wanted.end(), 1) != wanted.end() && search(kNear * cutoff)) search(cutoff);
+    for (std::size_t i = 0; i < crossings.size(); ++i)
+        if (distances[i] == kUnknownDistance)
+            distances[i] = wanted[i] ? std::numeric_limits<double>::infinity() : std::sqrt(least[i].get());
+}
+
+std::vector<double> crossing_distances(const std::vector<Vec3>& points,
+                                       const std::vector<Triangle>& triangles, const CrossingGrid& grid,
+                                       double cutoff) {
+    std::vector<double> distances(grid.crossings().size(), kUnknownDistance);
+    crossing_distances(points, triangles, grid, cutoff, distances);
+    return distances;
 }
 
 }  // namespace isotrack

@@ -53,8 +53,10 @@ bool is_needle(const FrameMesh& mesh, const Particles& particles, std::size_t tr
     return longest > kAnglesFrom * resolution;
 }
 
-std::vector<Inspection::Facet> facets_of(const FrameMesh& mesh) {
-    std::vector<Inspection::Facet> facets;
+}  // namespace
+
+std::vector<Inspector::Facet> Inspector::facets_of(const FrameMesh& mesh) {
+    std::vector<Facet> facets;
     facets.reserve(mesh.carved.triangles.size());
     for (std::size_t t = 0; t < mesh.carved.triangles.size(); ++t) {
         const auto& [i, j, k] = mesh.carved.triangles[t];
@@ -66,41 +68,43 @@ std::vector<Inspection::Facet> facets_of(const FrameMesh& mesh) {
     return facets;
 }
 
-/// Mesh to surface. Triangles are in the order of their cells, so those of `before` are met in one go.
-void measure_errors(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                    const Inspection& before, Inspection& result) {
-    result.facets = facets_of(mesh);
-    result.errors.resize(result.facets.size());
-    std::vector<int> fresh;
-    std::vector<Triangle> triangles;
+/// Calls `same` with the numbers of each facet that is in both, `changed` with each that is in one alone. The
+/// keys ascend, so they are met in one go.
+template <typename Both, typename One>
+void Inspector::compare(const std::vector<Facet>& now, const std::vector<Facet>& before, const Both& same,
+                        const One& changed) {
     std::size_t old = 0;
-    for (std::size_t t = 0; t < result.facets.size(); ++t) {
-        const Inspection::Facet& facet = result.facets[t];
-        while (facet.key >= 0 && old < before.facets.size() && before.facets[old].key < facet.key) ++old;
-        if (facet.key >= 0 && old < before.facets.size() && before.facets[old].key == facet.key &&
-            before.facets[old].corner == facet.corner) {
-            result.errors[t] = before.errors[old];
-        } else {
-            fresh.push_back(static_cast<int>(t));
-            triangles.push_back(mesh.carved.triangles[t]);
-        }
+    for (std::size_t f = 0; f < now.size(); ++f) {
+        while (now[f].key >= 0 && old < before.size() && before[old].key < now[f].key) changed(before[old++]);
+        if (old < before.size() && now[f] == before[old])
+            same(f, old++);
+        else
+            changed(now[f]);
     }
-    const auto errors =
-        triangle_errors(mesh.vertices, triangles, surface, kSteps, kSuspect * limits.tolerance);
-    for (std::size_t f = 0; f < fresh.size(); ++f) result.errors[fresh[f]] = errors[f];
+    while (old < before.size()) changed(before[old++]);
 }
 
-/// Mesh to surface, and some crossings of the surface to the mesh.
-Inspection held_against(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                        const CrossingGrid& grid, const Inspection& before) {
-    const std::vector<Surface::Crossing>& crossings = grid.crossings();
-    Inspection result;
-    measure_errors(mesh, surface, limits, before, result);
-    const auto distances =
-        crossing_distances(mesh.vertices, mesh.carved.triangles, grid, kLostAt * limits.tolerance);
+void Inspector::measure_errors(const FrameMesh& mesh, std::vector<Facet> facets, Inspection& result) {
+    constexpr int kNone = -1;
+    std::vector<int> known(facets.size(), kNone);
+    compare(
+        facets, facets_, [&](std::size_t f, std::size_t old) { known[f] = static_cast<int>(old); },
+        [](const Facet&) {});
+    std::vector<Triangle> fresh;
+    for (std::size_t f = 0; f < facets.size(); ++f)
+        if (known[f] == kNone) fresh.push_back(mesh.carved.triangles[f]);
+    const auto errors = triangle_errors(mesh.vertices, fresh, surface_, kSteps, kSuspect * limits_.tolerance);
+    auto next = errors.begin();
+    for (const int old : known) result.errors.push_back(old == kNone ? *next++ : errors_[old]);
+    facets_ = std::move(facets);
+    errors_ = result.errors;
+}
+
+void Inspector::take(const std::vector<double>& distances, const std::vector<Surface::Crossing>& crossings,
+                     Inspection& result) const {
     double sum = 0.0;
     for (std::size_t c = 0; c < crossings.size(); ++c) {
-        if (!(distances[c] <= kCertified * limits.tolerance)) result.missed.push_back(crossings[c]);
+        if (!(distances[c] <= kCertified * limits_.tolerance)) result.missed.push_back(crossings[c]);
         if (!std::isfinite(distances[c])) {
             ++result.lost_crossings;
             continue;
@@ -110,30 +114,53 @@ Inspection held_against(const FrameMesh& mesh, const Surface& surface, const Siz
     }
     const std::size_t found = crossings.size() - result.lost_crossings;
     if (found > 0) result.crossings_mean_square = sum / static_cast<double>(found);
+}
+
+Inspection Inspector::inspect(const FrameMesh& mesh) {
+    Inspection result;
+    measure_errors(mesh, facets_of(mesh), result);
+    const CrossingGrid grid(missed_, 2.0 * surface_.resolution());
+    take(crossing_distances(mesh.vertices, mesh.carved.triangles, grid, kLostAt * limits_.tolerance),
+         grid.crossings(), result);
     return result;
 }
 
-}  // namespace
+Inspection Inspector::inspect_all(const FrameMesh& mesh) {
+    Inspection result;
+    std::vector<Facet> facets = facets_of(mesh);
+    measure_errors(mesh, facets, result);
 
-Inspection inspect_again(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                         const Inspection& before) {
-    return held_against(mesh, surface, limits, CrossingGrid(before.missed, 2.0 * surface.resolution()),
-                        before);
-}
+    // Crossings near triangles that came or went.
+    const double cutoff = kLostAt * limits_.tolerance;
+    if (distances_.empty()) {
+        distances_.assign(crossings_.crossings().size(), kUnknownDistance);
+    } else {
+        compare(
+            facets, all_facets_, [](std::size_t, std::size_t) {},
+            [&](const Facet& facet) {
+                const auto& [a, b, c] = facet.corner;
+                const Vec3 reach = Vec3::Constant(cutoff);
+                crossings_.for_each_in(
+                    Box(a.cwiseMin(b).cwiseMin(c) - reach, a.cwiseMax(b).cwiseMax(c) + reach),
+                    [&](std::size_t i) { distances_[i] = kUnknownDistance; });
+            });
+    }
+    crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff, distances_);
+    all_facets_ = std::move(facets);
+    take(distances_, crossings_.crossings(), result);
+    missed_ = result.missed;
 
-Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                   const CrossingGrid& crossings, const Inspection& before) {
-    Inspection result = held_against(mesh, surface, limits, crossings, before);
-    result.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, surface, crossings.crossings());
-    const Vec3 near = Vec3::Constant(kFaultReach * surface.resolution());
+    result.topology =
+        lattice_topology(mesh.vertices, mesh.carved.triangles, surface_, crossings_.crossings());
+    const Vec3 near = Vec3::Constant(kFaultReach * surface_.resolution());
     std::vector<std::size_t> doubtful;
     for (const Vec3& fault : result.topology.faults)
-        crossings.for_each_in(Box(fault - near, fault + near), [&](std::size_t c) {
-            if ((crossings.crossings()[c].point - fault).norm() <= near.x()) doubtful.push_back(c);
+        crossings_.for_each_in(Box(fault - near, fault + near), [&](std::size_t c) {
+            if ((crossings_.crossings()[c].point - fault).norm() <= near.x()) doubtful.push_back(c);
         });
     std::sort(doubtful.begin(), doubtful.end());
     doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
-    for (const std::size_t c : doubtful) result.doubtful.push_back(crossings.crossings()[c].point);
+    for (const std::size_t c : doubtful) result.doubtful.push_back(crossings_.crossings()[c].point);
     return result;
 }
 

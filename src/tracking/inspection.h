@@ -21,12 +21,7 @@ struct FrameMesh {
 };
 
 struct Inspection {
-    std::vector<TriangleError> errors;  ///< Per triangle.
-    struct Facet {
-        int key;  ///< Of the cell and its facet; ascending but for halves of split triangles, which have -1.
-        std::array<Vec3, 3> corner;
-    };
-    std::vector<Facet> facets;              ///< Per triangle, as the errors were measured.
+    std::vector<TriangleError> errors;      ///< Per triangle.
     std::vector<Surface::Crossing> missed;  ///< Crossings farther from the mesh than the tolerance.
     double farthest_crossing = 0.0, crossings_mean_square = 0.0;  ///< Of those that were found.
     std::size_t lost_crossings = 0;                               ///< Those that were not.
@@ -34,13 +29,41 @@ struct Inspection {
     std::vector<Vec3> doubtful;  ///< Crossings near its faults.
 };
 
-/// Both ways, and the topology. Errors of triangles that `before` has, too, are taken over.
-Inspection inspect(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                   const CrossingGrid& crossings, const Inspection& before);
+/// Inspects the meshes of one frame, each a little different from the one before: what lies away from the
+/// triangles that changed is not measured again.
+class Inspector {
+public:
+    /// All three must outlive it.
+    Inspector(const Surface& surface, const SizingLimits& limits, const CrossingGrid& crossings)
+        : surface_(surface), limits_(limits), crossings_(crossings) {}
 
-/// Mesh to surface, and only those crossings that `before` missed.
-Inspection inspect_again(const FrameMesh& mesh, const Surface& surface, const SizingLimits& limits,
-                         const Inspection& before);
+    /// Mesh to surface, and only those crossings that `inspect_all` missed last.
+    Inspection inspect(const FrameMesh& mesh);
+    /// Both ways, and the topology.
+    Inspection inspect_all(const FrameMesh& mesh);
+
+private:
+    struct Facet {
+        int key;  // of the cell and its facet; ascending but for halves of split triangles, which have -1
+        std::array<Vec3, 3> corner;
+        bool operator==(const Facet& o) const { return key >= 0 && key == o.key && corner == o.corner; }
+    };
+    static std::vector<Facet> facets_of(const FrameMesh& mesh);
+    template <typename Both, typename One>
+    static void compare(const std::vector<Facet>& now, const std::vector<Facet>& before, const Both& same,
+                        const One& changed);
+    void measure_errors(const FrameMesh& mesh, std::vector<Facet> facets, Inspection& result);
+    void take(const std::vector<double>& distances, const std::vector<Surface::Crossing>& crossings,
+              Inspection& result) const;
+
+    const Surface& surface_;
+    const SizingLimits& limits_;
+    const CrossingGrid& crossings_;
+    std::vector<Facet> facets_, all_facets_;  // of the last inspection, and of the last of everything
+    std::vector<TriangleError> errors_;       // per facet of the first
+    std::vector<double> distances_;           // per crossing, to the second
+    std::vector<Surface::Crossing> missed_;
+};
 
 /// Where particles are missing: at the dual crossings of triangles with too large an error or, where the
 /// surface is smooth, too small an angle; at crossings that are missed; around nodes whose side is wrong; on

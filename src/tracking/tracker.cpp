@@ -66,12 +66,17 @@ std::vector<Triangle> particle_triangles(const CarvedSurface& carved) {
 }
 
 /// The distance to the nearest Delaunay neighbour that faces the other way.
-std::vector<double> thickness_of(const Particles& particles, const Adjacency& adjacency) {
+std::vector<double> thickness_of(const Particles& particles, const Tetrahedra& cells) {
     std::vector<double> th(particles.size(), std::numeric_limits<double>::infinity());
-    for (std::size_t i = 0; i < particles.size(); ++i)
-        for (const int j : adjacency.of(i))
-            if (particles.normal[i].dot(particles.normal[j]) < 0.0)
-                th[i] = std::min(th[i], (particles.position[i] - particles.position[j]).norm());
+    for (const auto& cell : cells.vertices)
+        for (int a = 0; a < 4; ++a)
+            for (int b = a + 1; b < 4; ++b) {
+                const int i = cell[a], j = cell[b];
+                if (i < 0 || j < 0 || !(particles.normal[i].dot(particles.normal[j]) < 0.0)) continue;
+                const double apart = (particles.position[i] - particles.position[j]).norm();
+                th[i] = std::min(th[i], apart);
+                th[j] = std::min(th[j], apart);
+            }
     return th;
 }
 
@@ -314,7 +319,7 @@ struct Tracker::Impl {
               const SizingLimits& l) {
         constexpr int kSizingSteps = 3;  // barycentric lattice of the samples: with the centroid
         SizingEvidence evidence;
-        evidence.thickness = thickness_of(particles, adjacency);
+        evidence.thickness = thickness_of(particles, dt->cells());
         evidence.error.assign(particles.size(), -1.0);
         const auto errors = triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps);
         for (std::size_t t = 0; t < errors.size(); ++t)
@@ -394,7 +399,7 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, const 
     if (options.fit) fit_vertices(mesh, surface, seconds);
     {
         const StageTimer timer(seconds, "certify");
-        if (mend(mesh, inspect(mesh, surface, l, crossings, {}), surface, l) == 0) return;
+        if (mend(mesh, Inspector(surface, l, crossings).inspect_all(mesh), surface, l) == 0) return;
     }
     tetrahedralise(false, seconds);
     const StageTimer timer(seconds, "relax");
@@ -431,7 +436,7 @@ void Tracker::Impl::remember_errors(const FrameMesh& mesh, const std::vector<Tri
 void Tracker::Impl::remember(const FrameMesh& mesh) {
     memory.triangles = particle_triangles(mesh.carved);
     memory.evidence.error.resize(particles.size(), -1.0);
-    memory.evidence.thickness = thickness_of(particles, vertex_adjacency(dt->cells(), particles.size()));
+    memory.evidence.thickness = thickness_of(particles, dt->cells());
     memory.ring = ring_of(memory.triangles, particles.size());
 }
 
@@ -478,27 +483,22 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         sample(surface, l, crossings, warm, frame);
     tetrahedralise(true, seconds);
     FrameMesh mesh;
+    Inspector inspector(surface, l, crossings);
     Inspection inspection;
-    // Rounds look at the triangles and what was missed before; only a mesh that passes so, or the last, is
-    // held against the whole surface.
-    bool whole = true;
+    // Rounds look at the triangles and what the whole surface missed last; only a mesh that passes so, or the
+    // last, is held against the whole surface.
     for (int round = 0;; ++round) {
         mesh = carve_mesh(surface, seconds);
         if (options.fit) fit_vertices(mesh, surface, seconds);
         const StageTimer timer(seconds, "certify");
         if (options.fit) undo_crossing_fits(mesh);
-        const bool last = options.method == Method::Paper || round == kCertifyRounds;
-        if (!whole && !last) {
-            inspection = inspect_again(mesh, surface, l, inspection);
-            if (mend(mesh, inspection, surface, l) > 0) {
-                tetrahedralise(false, seconds);
-                continue;
-            }
-        }
-        inspection = inspect(mesh, surface, l, crossings, inspection);
+        inspection = inspector.inspect(mesh);
         if (round == 0) remember_errors(mesh, inspection.errors);
-        if (last || mend(mesh, inspection, surface, l) == 0) break;
-        whole = false;
+        const bool last = options.method == Method::Paper || round == kCertifyRounds;
+        if (last || mend(mesh, inspection, surface, l) == 0) {
+            inspection = inspector.inspect_all(mesh);
+            if (last || mend(mesh, inspection, surface, l) == 0) break;
+        }
         tetrahedralise(false, seconds);
     }
     report(mesh, inspection, l, frame);

@@ -43,4 +43,10 @@ std::vector<double> crossing_distances(const std::vector<Vec3>& points,
                                        const std::vector<Triangle>& triangles, const CrossingGrid& grid,
                                        double cutoff);
 
+constexpr double kUnknownDistance = -1.0;
+
+/// The same for the entries of `distances` that are unknown; the others stay.
+void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                        const CrossingGrid& grid, double cutoff, std::vector<double>& distances);
+
 }  // namespace isotrack
