@@ -84,8 +84,9 @@ void Inspector::compare(const std::vector<Facet>& now, const std::vector<Facet>&
     while (old < before.size()) changed(before[old++]);
 }
 
-void Inspector::measure_errors(const FrameMesh& mesh, std::vector<Facet> facets, Inspection& result) {
+void Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
     constexpr int kNone = -1;
+    std::vector<Facet> facets = facets_of(mesh);
     std::vector<int> known(facets.size(), kNone);
     compare(
         facets, facets_, [&](std::size_t f, std::size_t old) { known[f] = static_cast<int>(old); },
@@ -102,6 +103,9 @@ void Inspector::measure_errors(const FrameMesh& mesh, std::vector<Facet> facets,
 
 void Inspector::take(const std::vector<double>& distances, const std::vector<Surface::Crossing>& crossings,
                      Inspection& result) const {
+    result.missed.clear();
+    result.farthest_crossing = 0.0;
+    result.lost_crossings = 0;
     double sum = 0.0;
     for (std::size_t c = 0; c < crossings.size(); ++c) {
         if (!(distances[c] <= kCertified * limits_.tolerance)) result.missed.push_back(crossings[c]);
@@ -118,25 +122,21 @@ void Inspector::take(const std::vector<double>& distances, const std::vector<Sur
 
 Inspection Inspector::inspect(const FrameMesh& mesh) {
     Inspection result;
-    measure_errors(mesh, facets_of(mesh), result);
+    measure_errors(mesh, result);
     const CrossingGrid grid(missed_, 2.0 * surface_.resolution());
     take(crossing_distances(mesh.vertices, mesh.carved.triangles, grid, kLostAt * limits_.tolerance),
          grid.crossings(), result);
     return result;
 }
 
-Inspection Inspector::inspect_all(const FrameMesh& mesh) {
-    Inspection result;
-    std::vector<Facet> facets = facets_of(mesh);
-    measure_errors(mesh, facets, result);
-
+void Inspector::inspect_crossings(const FrameMesh& mesh, Inspection& inspection) {
     // Crossings near triangles that came or went.
     const double cutoff = kLostAt * limits_.tolerance;
     if (distances_.empty()) {
         distances_.assign(crossings_.crossings().size(), kUnknownDistance);
     } else {
         compare(
-            facets, all_facets_, [](std::size_t, std::size_t) {},
+            facets_, reached_, [](std::size_t, std::size_t) {},
             [&](const Facet& facet) {
                 const auto& [a, b, c] = facet.corner;
                 const Vec3 reach = Vec3::Constant(cutoff);
@@ -146,22 +146,23 @@ Inspection Inspector::inspect_all(const FrameMesh& mesh) {
             });
     }
     crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff, distances_);
-    all_facets_ = std::move(facets);
-    take(distances_, crossings_.crossings(), result);
-    missed_ = result.missed;
+    reached_ = facets_;
+    take(distances_, crossings_.crossings(), inspection);
+    missed_ = inspection.missed;
+}
 
-    result.topology =
+void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) const {
+    inspection.topology =
         lattice_topology(mesh.vertices, mesh.carved.triangles, surface_, crossings_.crossings());
     const Vec3 near = Vec3::Constant(kFaultReach * surface_.resolution());
     std::vector<std::size_t> doubtful;
-    for (const Vec3& fault : result.topology.faults)
+    for (const Vec3& fault : inspection.topology.faults)
         crossings_.for_each_in(Box(fault - near, fault + near), [&](std::size_t c) {
             if ((crossings_.crossings()[c].point - fault).norm() <= near.x()) doubtful.push_back(c);
         });
     std::sort(doubtful.begin(), doubtful.end());
     doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
-    for (const std::size_t c : doubtful) result.doubtful.push_back(crossings_.crossings()[c].point);
-    return result;
+    for (const std::size_t c : doubtful) inspection.doubtful.push_back(crossings_.crossings()[c].point);
 }
 
 std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspection, const Tetrahedra& cells,

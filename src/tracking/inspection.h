@@ -37,10 +37,12 @@ public:
     Inspector(const Surface& surface, const SizingLimits& limits, const CrossingGrid& crossings)
         : surface_(surface), limits_(limits), crossings_(crossings) {}
 
-    /// Mesh to surface, and only those crossings that `inspect_all` missed last.
+    /// Mesh to surface, and only those crossings that were missed when all were looked for last.
     Inspection inspect(const FrameMesh& mesh);
-    /// Both ways, and the topology.
-    Inspection inspect_all(const FrameMesh& mesh);
+    /// Surface to mesh, for the mesh just inspected.
+    void inspect_crossings(const FrameMesh& mesh, Inspection& inspection);
+    /// And its topology.
+    void inspect_topology(const FrameMesh& mesh, Inspection& inspection) const;
 
 private:
     struct Facet {
@@ -52,16 +54,17 @@ private:
     template <typename Both, typename One>
     static void compare(const std::vector<Facet>& now, const std::vector<Facet>& before, const Both& same,
                         const One& changed);
-    void measure_errors(const FrameMesh& mesh, std::vector<Facet> facets, Inspection& result);
+    void measure_errors(const FrameMesh& mesh, Inspection& result);
     void take(const std::vector<double>& distances, const std::vector<Surface::Crossing>& crossings,
               Inspection& result) const;
 
     const Surface& surface_;
     const SizingLimits& limits_;
     const CrossingGrid& crossings_;
-    std::vector<Facet> facets_, all_facets_;  // of the last inspection, and of the last of everything
-    std::vector<TriangleError> errors_;       // per facet of the first
-    std::vector<double> distances_;           // per crossing, to the second
+    std::vector<Facet> facets_;          // of the last inspection
+    std::vector<TriangleError> errors_;  // of each
+    std::vector<Facet> reached_;         // of the last inspection of the crossings
+    std::vector<double> distances_;      // to them, per crossing
     std::vector<Surface::Crossing> missed_;
 };
 

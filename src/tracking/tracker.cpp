@@ -399,7 +399,11 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, const 
     if (options.fit) fit_vertices(mesh, surface, seconds);
     {
         const StageTimer timer(seconds, "certify");
-        if (mend(mesh, Inspector(surface, l, crossings).inspect_all(mesh), surface, l) == 0) return;
+        Inspector inspector(surface, l, crossings);
+        Inspection inspection = inspector.inspect(mesh);
+        inspector.inspect_crossings(mesh, inspection);
+        inspector.inspect_topology(mesh, inspection);
+        if (mend(mesh, inspection, surface, l) == 0) return;
     }
     tetrahedralise(false, seconds);
     const StageTimer timer(seconds, "relax");
@@ -485,19 +489,22 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
     FrameMesh mesh;
     Inspector inspector(surface, l, crossings);
     Inspection inspection;
-    // Rounds look at the triangles and what the whole surface missed last; only a mesh that passes so, or the
-    // last, is held against the whole surface.
+    // What takes longer to look at is looked at when all before it passes.
     for (int round = 0;; ++round) {
         mesh = carve_mesh(surface, seconds);
         if (options.fit) fit_vertices(mesh, surface, seconds);
         const StageTimer timer(seconds, "certify");
         if (options.fit) undo_crossing_fits(mesh);
+        const bool last = options.method == Method::Paper || round == kCertifyRounds;
+        const auto passes = [&] { return last || mend(mesh, inspection, surface, l) == 0; };
         inspection = inspector.inspect(mesh);
         if (round == 0) remember_errors(mesh, inspection.errors);
-        const bool last = options.method == Method::Paper || round == kCertifyRounds;
-        if (last || mend(mesh, inspection, surface, l) == 0) {
-            inspection = inspector.inspect_all(mesh);
-            if (last || mend(mesh, inspection, surface, l) == 0) break;
+        if (passes()) {
+            inspector.inspect_crossings(mesh, inspection);
+            if (passes()) {
+                inspector.inspect_topology(mesh, inspection);
+                if (passes()) break;
+            }
         }
         tetrahedralise(false, seconds);
     }
