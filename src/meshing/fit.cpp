@@ -85,12 +85,19 @@ bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const
 
 }  // namespace
 
-void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, const Surface& surface,
-         int steps) {
+void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& all_triangles, const Surface& surface,
+         int steps, const std::vector<char>& movable) {
+    const auto moves = [&](int v) { return movable.empty() || movable[v]; };
+    std::vector<Triangle> triangles;
+    std::vector<int> moving;
+    for (const Triangle& t : all_triangles)
+        if (moves(t[0]) || moves(t[1]) || moves(t[2])) triangles.push_back(t);
+    for (std::size_t v = 0; v < vertices.size(); ++v)
+        if (moves(static_cast<int>(v))) moving.push_back(static_cast<int>(v));
     const Corners corners(vertices.size(), triangles);
     const auto for_each_vertex = [&](const auto& body) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices.size(), 256), [&](const auto& range) {
-            for (std::size_t v = range.begin(); v < range.end(); ++v) body(v);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, moving.size(), 256), [&](const auto& range) {
+            for (std::size_t m = range.begin(); m < range.end(); ++m) body(moving[m]);
         });
     };
     const auto for_each_triangle = [&](const auto& body) {
@@ -101,7 +108,7 @@ void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, co
 
     std::vector<Shares> shares(triangles.size());
     std::vector<char> bad(triangles.size());
-    std::vector<Vec3> to(vertices.size());
+    std::vector<Vec3> to = vertices;
     tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
     for (int step = 0; step < steps; ++step) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
@@ -110,7 +117,7 @@ void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, co
                 shares[t] = shares_of(vertices[triangles[t][0]], vertices[triangles[t][1]],
                                       vertices[triangles[t][2]], probe);
         });
-        for_each_vertex([&](std::size_t v) {
+        for_each_vertex([&](int v) {
             Mat3 quadric = Mat3::Zero();
             Vec3 pull = Vec3::Zero();
             double shortest2 = std::numeric_limits<double>::infinity();
@@ -137,14 +144,14 @@ void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, co
                 bad[t] = spoilt(vertices[i], vertices[j], vertices[k], to[i], to[j], to[k]);
             });
             if (std::find(bad.begin(), bad.end(), 1) == bad.end()) break;
-            for_each_vertex([&](std::size_t v) {
+            for_each_vertex([&](int v) {
                 bool back = false;
                 for (int e = corners.first[v]; e < corners.first[v + 1] && !back; ++e)
                     back = bad[corners.corner[e] / 3];
                 if (back) to[v] = pass < kHalvings ? Vec3(0.5 * (vertices[v] + to[v])) : vertices[v];
             });
         }
-        vertices.swap(to);
+        for (const int v : moving) vertices[v] = to[v];
     }
 }
 

@@ -137,6 +137,27 @@ struct Memory {
     }
 };
 
+/// Where the particles' vertices were after the last fit, and a number for the triangles around each; 0: not
+/// to be relied on.
+struct Fitted {
+    std::vector<Vec3> position;
+    std::vector<std::uint64_t> ring;
+};
+
+/// Sums over the triangles around each particle: equal for equal rings, whatever their order.
+std::vector<std::uint64_t> ring_signatures(const CarvedSurface& carved, std::size_t particles) {
+    std::vector<std::uint64_t> result(particles, 0);
+    for (const Triangle& t : carved.triangles) {
+        Triangle p = {carved.particle[t[0]], carved.particle[t[1]], carved.particle[t[2]]};
+        std::sort(p.begin(), p.end());
+        std::uint64_t h = 0x9e3779b97f4a7c15u;
+        for (const int v : p) h = (h ^ static_cast<std::uint64_t>(v + 1)) * 0xbf58476d1ce4e5b9u ^ (h >> 29);
+        for (const int v : p)
+            if (v >= 0) result[v] += h;
+    }
+    return result;
+}
+
 /// Files hold floats: what is certified must be what is written.
 void round_to_float(Particles& particles) {
     for (Vec3& p : particles.position) p = p.cast<float>().cast<double>();
@@ -282,10 +303,33 @@ struct Tracker::Impl {
         return mesh;
     }
 
-    void fit_vertices(FrameMesh& mesh, const Surface& surface, std::map<std::string, double>& seconds) {
+    /// Fits anew what is within two rings of where the mesh differs from the one fitted before, `fitted`.
+    void fit_vertices(FrameMesh& mesh, Fitted& fitted, const Surface& surface,
+                      std::map<std::string, double>& seconds) {
         const StageTimer timer(seconds, "fit");
-        fit(mesh.vertices, mesh.carved.triangles, surface, kFitSteps);
+        const std::vector<std::uint64_t> rings = ring_signatures(mesh.carved, particles.size());
+        std::vector<char> movable(mesh.vertices.size(), 1);
+        for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+            const int p = mesh.carved.particle[v];
+            if (p < 0 || p >= static_cast<int>(fitted.ring.size()) || fitted.ring[p] != rings[p]) continue;
+            movable[v] = 0;
+            mesh.vertices[v] = fitted.position[p];
+        }
+        constexpr int kRings = 2;
+        for (int ring = 0; ring < kRings; ++ring) {
+            const std::vector<char> before = movable;
+            for (const Triangle& t : mesh.carved.triangles)
+                if (before[t[0]] || before[t[1]] || before[t[2]])
+                    for (const int v : t) movable[v] = 1;
+        }
+        fit(mesh.vertices, mesh.carved.triangles, surface, kFitSteps, movable);
         for (Vec3& v : mesh.vertices) v = v.cast<float>().cast<double>();
+        undo_crossing_fits(mesh);
+        fitted.ring = rings;
+        fitted.position.resize(particles.size());
+        for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+            if (const int p = mesh.carved.particle[v]; p >= 0) fitted.position[p] = mesh.vertices[v];
+        for (const auto& pinch : mesh.carved.pinched) fitted.ring[pinch.particle] = 0;  // several vertices
     }
 
     /// Puts fitted vertices back where their triangles cross others, a ring further each time, until none
@@ -379,7 +423,8 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, const 
     for (int round = 0; round < rounds; ++round) {
         tetrahedralise(true, seconds);
         FrameMesh mesh = carve_mesh(surface, seconds);
-        if (options.fit) fit_vertices(mesh, surface, seconds);
+        Fitted none;
+        if (options.fit) fit_vertices(mesh, none, surface, seconds);
         const Adjacency adjacency = vertex_adjacency(dt->cells(), particles.size());
         {
             const StageTimer timer(seconds, "size");
@@ -396,7 +441,8 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, const 
     // Most of what fails is mended here, where its surroundings can still make room.
     tetrahedralise(true, seconds);
     FrameMesh mesh = carve_mesh(surface, seconds);
-    if (options.fit) fit_vertices(mesh, surface, seconds);
+    Fitted none;
+    if (options.fit) fit_vertices(mesh, none, surface, seconds);
     {
         const StageTimer timer(seconds, "certify");
         Inspector inspector(surface, l, crossings);
@@ -487,14 +533,14 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         sample(surface, l, crossings, warm, frame);
     tetrahedralise(true, seconds);
     FrameMesh mesh;
+    Fitted fitted;
     Inspector inspector(surface, l, crossings);
     Inspection inspection;
     // What takes longer to look at is looked at when all before it passes.
     for (int round = 0;; ++round) {
         mesh = carve_mesh(surface, seconds);
-        if (options.fit) fit_vertices(mesh, surface, seconds);
+        if (options.fit) fit_vertices(mesh, fitted, surface, seconds);
         const StageTimer timer(seconds, "certify");
-        if (options.fit) undo_crossing_fits(mesh);
         const bool last = options.method == Method::Paper || round == kCertifyRounds;
         const auto passes = [&] { return last || mend(mesh, inspection, surface, l) == 0; };
         inspection = inspector.inspect(mesh);
