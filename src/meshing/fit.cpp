@@ -21,7 +21,7 @@ constexpr double kWeight[3] = {54.0, 9.0, 4.0};  // in the middle, on an edge, i
 constexpr double kRelaxation = 1.5;   // the shares of the neighbours make each step too short
 constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
 constexpr double kDamping = 0.02;     // of the quadric's trace: how freely a vertex slides along the surface
-constexpr double kLeastAngle = 3.14159265358979323846 / 6.0;
+constexpr double kLargestCotangent = 1.7320508075688772;  // of 30 degrees
 constexpr int kHalvings = 2;  // of the steps around a spoilt triangle, before they are taken back
 
 /// The triangles around each vertex: those of v are entries first[v] to first[v + 1] - 1, as 3 * triangle +
@@ -66,11 +66,10 @@ Shares shares_of(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& pr
     return result;
 }
 
-double smallest_angle(const Vec3& p, const Vec3& q, const Vec3& r) {
+/// Cotangent of the smallest angle.
+double sharpness(const Vec3& p, const Vec3& q, const Vec3& r) {
     const Vec3 u = q - p, v = r - q, w = p - r;
-    // The smallest angle has the largest cotangent; all share the area.
-    const double area2 = u.cross(v).norm();
-    return std::atan2(area2, std::max({-u.dot(w), -v.dot(u), -w.dot(v)}));
+    return std::max({-u.dot(w), -v.dot(u), -w.dot(v)}) / u.cross(v).norm();
 }
 
 /// Whether a triangle turns over by these steps, or gets too sharp and sharper than it was.
@@ -79,8 +78,8 @@ bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const
     const Vec3 area = (b - a).cross(c - a);
     if (area == Vec3::Zero()) return false;
     if (!(area.dot((b_to - a_to).cross(c_to - a_to)) > 0.0)) return true;
-    const double angle = smallest_angle(a_to, b_to, c_to);
-    return angle < kLeastAngle && angle < smallest_angle(a, b, c);
+    const double after = sharpness(a_to, b_to, c_to);
+    return after > kLargestCotangent && after > sharpness(a, b, c);
 }
 
 }  // namespace

@@ -142,6 +142,12 @@ struct Memory {
 struct Fitted {
     std::vector<Vec3> position;
     std::vector<std::uint64_t> ring;
+
+    void take(const FrameMesh& mesh, std::size_t particles) {
+        position.resize(particles);
+        for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+            if (const int p = mesh.carved.particle[v]; p >= 0) position[p] = mesh.vertices[v];
+    }
 };
 
 /// Sums over the triangles around each particle: equal for equal rings, whatever their order.
@@ -324,17 +330,14 @@ struct Tracker::Impl {
         }
         fit(mesh.vertices, mesh.carved.triangles, surface, kFitSteps, movable);
         for (Vec3& v : mesh.vertices) v = v.cast<float>().cast<double>();
-        undo_crossing_fits(mesh);
         fitted.ring = rings;
-        fitted.position.resize(particles.size());
-        for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-            if (const int p = mesh.carved.particle[v]; p >= 0) fitted.position[p] = mesh.vertices[v];
+        fitted.take(mesh, particles.size());
         for (const auto& pinch : mesh.carved.pinched) fitted.ring[pinch.particle] = 0;  // several vertices
     }
 
     /// Puts fitted vertices back where their triangles cross others, a ring further each time, until none
-    /// cross. Facets of a DT do not.
-    static void undo_crossing_fits(FrameMesh& b) {
+    /// cross. Facets of a DT do not. Returns whether any did.
+    static bool undo_crossing_fits(FrameMesh& b) {
         TriangleMesh mesh;
         mesh.triangles = b.carved.triangles;
         std::vector<char> undo(b.vertices.size(), 0);
@@ -357,6 +360,7 @@ struct Tracker::Impl {
                 if (ring[t[0]] || ring[t[1]] || ring[t[2]])
                     for (const int v : t) undo[v] = 1;
         }
+        return std::find(undo.begin(), undo.end(), 1) != undo.end();
     }
 
     void size(const FrameMesh& mesh, const Adjacency& adjacency, const Surface& surface,
@@ -545,12 +549,19 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         const auto passes = [&] { return last || mend(mesh, inspection, surface, l) == 0; };
         inspection = inspector.inspect(mesh);
         if (round == 0) remember_errors(mesh, inspection.errors);
-        if (passes()) {
+        bool good = passes();
+        if (good && options.fit && undo_crossing_fits(mesh)) {
+            fitted.take(mesh, particles.size());
+            inspection = inspector.inspect(mesh);
+            good = passes();
+        }
+        if (good) {
             inspector.inspect_crossings(mesh, inspection);
-            if (passes()) {
-                inspector.inspect_topology(mesh, inspection);
-                if (passes()) break;
-            }
+            good = passes();
+        }
+        if (good) {
+            inspector.inspect_topology(mesh, inspection);
+            if (passes()) break;
         }
         tetrahedralise(false, seconds);
     }
