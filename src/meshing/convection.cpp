@@ -57,15 +57,21 @@ void update_labels(CellLabels& labels, const std::vector<int>& changed, const Te
                     one_sheet = one_sheet && normals[v[a]].dot(normals[v[b]]) >= 0.0;
             const Vec3& p0 = points[v[0]];
             const Vec3 e1 = points[v[1]] - p0, e2 = points[v[2]] - p0, e3 = points[v[3]] - p0;
-            const Surface::Sample centroid = probe.sample(p0 + 0.25 * (e1 + e2 + e3));
-            double value = centroid.value;
-            if (one_sheet && centroid.gradient.norm() > kClear) {
+            const Vec3 centroid = p0 + 0.25 * (e1 + e2 + e3);
+            double value = probe.value(centroid);
+            if (one_sheet) {
                 Vec3 centre;
-                if (!circumcentre(e1, e2, e3, centre)) {
-                    labels[c] = kFlat;
-                    continue;
+                const bool flat = !circumcentre(e1, e2, e3, centre);
+                const double at_centre = flat ? 0.0 : probe.value(p0 + centre);
+                // The gradient is dear, and matters only where the two do not agree.
+                if ((flat || (at_centre < 0.0) != (value < 0.0)) &&
+                    probe.sample(centroid).gradient.norm() > kClear) {
+                    if (flat) {
+                        labels[c] = kFlat;
+                        continue;
+                    }
+                    value = at_centre;
                 }
-                value = probe.value(p0 + centre);
             }
             labels[c] = value < 0.0 ? kInside : kOutside;
         }

@@ -1,34 +1,13 @@
 #include "isotrack/meshing/manifold.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
-#include <cstdint>
-#include <numeric>
+#include <array>
 #include <tuple>
 
 namespace isotrack {
 namespace {
-
-/// Disjoint sets of corners; the least member stands for its set, so the result does not depend on the order
-/// of the unions.
-class CornerSets {
-public:
-    explicit CornerSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
-    int find(int c) {
-        while (parent_[c] != c) c = parent_[c] = parent_[parent_[c]];
-        return c;
-    }
-    void unite(int a, int b) {
-        a = find(a);
-        b = find(b);
-        if (a < b)
-            parent_[b] = a;
-        else
-            parent_[a] = b;
-    }
-
-private:
-    std::vector<int> parent_;
-};
 
 /// The boundary facets of the inside cells, and which one follows which around an edge.
 class Boundary {
@@ -113,17 +92,19 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     const auto& facets = boundary.facets();
     const std::size_t count = facets.size();
 
-    std::vector<Triangle> mates(count, {-1, -1, -1});
-    CornerSets sets(3 * count);
-    for (std::size_t f = 0; f < count; ++f)
-        for (int k = 0; k < 3; ++k) {
-            if (mates[f][k] >= 0) continue;
-            const Boundary::Side g = boundary.mate(static_cast<int>(f), k);
-            mates[f][k] = g.facet;
-            mates[g.facet][g.corner] = static_cast<int>(f);
+    std::vector<std::array<Boundary::Side, 3>> mates(count);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 512), [&](const auto& range) {
+        for (std::size_t f = range.begin(); f < range.end(); ++f)
+            for (int k = 0; k < 3; ++k) mates[f][k] = boundary.mate(static_cast<int>(f), k);
+    });
+    // Going from mate to mate around a corner comes back to it; the least corner stands for its cycle.
+    std::vector<int> set(3 * count, -1);
+    for (std::size_t c = 0; c < set.size(); ++c)
+        for (int at = static_cast<int>(c); set[at] < 0;) {
+            set[at] = static_cast<int>(c);
+            const Boundary::Side& next = mates[at / 3][(at % 3 + 1) % 3];
             // Mates run along their edge in opposite directions.
-            sets.unite(static_cast<int>(3 * f) + (k + 1) % 3, 3 * g.facet + (g.corner + 2) % 3);
-            sets.unite(static_cast<int>(3 * f) + (k + 2) % 3, 3 * g.facet + (g.corner + 1) % 3);
+            at = 3 * next.facet + (next.corner + 1) % 3;
         }
 
     // The first corner set at a particle, in the order of the facets, is its own vertex; the others are
@@ -132,7 +113,7 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     std::vector<int> first_set(points.size(), -1);
     std::vector<int> copies;
     for (std::size_t c = 0; c < 3 * count; ++c) {
-        if (sets.find(static_cast<int>(c)) != static_cast<int>(c)) continue;
+        if (set[c] != static_cast<int>(c)) continue;
         const int p = boundary.particle(static_cast<int>(c / 3), static_cast<int>(c % 3));
         if (first_set[p] < 0)
             first_set[p] = static_cast<int>(c);
@@ -161,7 +142,7 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     std::vector<Triangle> in_particles(count);
     for (std::size_t f = 0; f < count; ++f) {
         for (int k = 0; k < 3; ++k) {
-            result.triangles[f][k] = vertex_of_set[sets.find(static_cast<int>(3 * f) + k)];
+            result.triangles[f][k] = vertex_of_set[set[3 * f + k]];
             in_particles[f][k] = boundary.particle(static_cast<int>(f), k);
         }
         result.inside_cell.push_back(facets[f].cell);
@@ -200,7 +181,7 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
         std::sort(ambiguous.begin(), ambiguous.end());
         std::vector<std::array<int, 2>> to_split;  // triangle, corner; each pair of mates once
         for (const HalfEdge& e : edges)
-            if (e.triangle < mates[e.triangle][e.corner] &&
+            if (e.triangle < mates[e.triangle][e.corner].facet &&
                 std::binary_search(ambiguous.begin(), ambiguous.end(), std::pair<int, int>(particles_of(e))))
                 to_split.push_back({e.triangle, e.corner});
         std::vector<std::array<int, 3>> midpoint(count, {-1, -1, -1});
@@ -209,12 +190,8 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
             const int m = static_cast<int>(result.particle.size());
             result.midpoints.push_back(0.5 * (points[result.particle[a]] + points[result.particle[b]]));
             result.particle.push_back(-1);
-            const int g = mates[t][k];
             midpoint[t][k] = m;
-            for (int j = 0; j < 3; ++j)
-                if (mates[g][j] == t && result.triangles[g][(j + 1) % 3] == b &&
-                    result.triangles[g][(j + 2) % 3] == a)
-                    midpoint[g][j] = m;
+            midpoint[mates[t][k].facet][mates[t][k].corner] = m;
         }
         for (std::size_t f = 0; f < count; ++f) {
             // A triangle with midpoints on its edges, as a polygon, fanned from a midpoint: no two halves

@@ -10,6 +10,7 @@ namespace isotrack {
 namespace {
 
 constexpr double kUncertain = 0.5;  // resolutions
+constexpr int kPasses = 4;
 
 /// An edge of the DT by one cell that has it: the edge between vertices a and b.
 struct Edge {
@@ -77,30 +78,42 @@ std::vector<std::vector<int>> fans_of(const Tetrahedra& cells, const CellLabels&
     return fans;
 }
 
-/// Complex edges and pinched vertices among the edges and vertices of some cells.
-std::size_t tangles(const Tetrahedra& cells, const CellLabels& labels, const std::vector<int>& of) {
+/// Where tangles may be: edges and vertices, each with a cell that has it.
+struct Places {
     std::vector<Edge> edges;
-    std::vector<std::pair<int, int>> vertices;  // and a cell
+    std::vector<CarvedSurface::Pinch> vertices;
+};
+
+/// The edges and vertices of some cells, each once.
+Places places_of(const Tetrahedra& cells, const std::vector<int>& of) {
+    Places result;
     for (const int c : of)
         for (int i = 0; i < 4; ++i) {
-            if (cells.vertices[c][i] >= 0) vertices.emplace_back(cells.vertices[c][i], c);
-            for (int j = i + 1; j < 4; ++j) edges.push_back(edge_of(cells, c, i, j));
+            if (cells.vertices[c][i] >= 0) result.vertices.push_back({cells.vertices[c][i], c});
+            for (int j = i + 1; j < 4; ++j) result.edges.push_back(edge_of(cells, c, i, j));
         }
+    auto& [edges, vertices] = result;
     std::sort(edges.begin(), edges.end());
     edges.erase(
         std::unique(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) { return a.same_place(b); }),
         edges.end());
-    std::sort(vertices.begin(), vertices.end());
+    std::sort(vertices.begin(), vertices.end(), [](const auto& a, const auto& b) {
+        return std::tie(a.particle, a.cell) < std::tie(b.particle, b.cell);
+    });
     vertices.erase(std::unique(vertices.begin(), vertices.end(),
-                               [](const auto& a, const auto& b) { return a.first == b.first; }),
+                               [](const auto& a, const auto& b) { return a.particle == b.particle; }),
                    vertices.end());
+    return result;
+}
+
+std::size_t count_tangles(const Tetrahedra& cells, const CellLabels& labels, const Places& places) {
     std::vector<int> ring;
     std::size_t count = 0;
-    for (const Edge& e : edges) {
+    for (const Edge& e : places.edges) {
         ring_of(cells, e, ring);
         count += is_complex(labels, ring);
     }
-    for (const auto& [v, c] : vertices) count += fans_of(cells, labels, v, c).size() > 2;
+    for (const auto& [v, c] : places.vertices) count += fans_of(cells, labels, v, c).size() > 2;
     return count;
 }
 
@@ -124,42 +137,55 @@ bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec
         }
         return run;
     };
+    std::vector<int> changed;
     /// Changes the label of the least certain run that lessens the tangles.
     const auto relabel = [&](std::vector<Run>& runs) {
         std::stable_sort(runs.begin(), runs.end(),
                          [](const Run& a, const Run& b) { return a.certainty < b.certainty; });
         for (const Run& run : runs) {
             if (run.certainty > limit) break;
-            const std::size_t before = tangles(cells, labels, run.cells);
+            const Places places = places_of(cells, run.cells);
+            const std::size_t before = count_tangles(cells, labels, places);
             for (const int c : run.cells) labels[c] = !labels[c];
-            if (tangles(cells, labels, run.cells) < before) return true;
+            if (count_tangles(cells, labels, places) < before) {
+                changed.insert(changed.end(), run.cells.begin(), run.cells.end());
+                return;
+            }
             for (const int c : run.cells) labels[c] = !labels[c];
         }
-        return false;
     };
 
+    Places places;
+    for (const auto& e : carved.complex_edges) places.edges.push_back({e.from, e.to, e.cell});
+    places.vertices = carved.pinched;
     bool any = false;
     std::vector<int> ring;
-    for (const auto& e : carved.complex_edges) {
-        ring_of(cells, {e.from, e.to, e.cell}, ring);
-        if (!is_complex(labels, ring)) continue;
-        std::size_t start = 0;  // of a run
-        while (labels[ring[start]] == labels[ring[(start + ring.size() - 1) % ring.size()]]) ++start;
-        std::rotate(ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(start), ring.end());
-        std::vector<Run> runs;
-        for (std::size_t i = 0, end; i < ring.size(); i = end) {
-            for (end = i + 1; end < ring.size() && labels[ring[end]] == labels[ring[i]];) ++end;
-            runs.push_back(run_of({ring.begin() + static_cast<std::ptrdiff_t>(i),
-                                   ring.begin() + static_cast<std::ptrdiff_t>(end)}));
+    for (int pass = 0; pass < kPasses; ++pass) {
+        changed.clear();
+        for (const Edge& e : places.edges) {
+            ring_of(cells, e, ring);
+            if (!is_complex(labels, ring)) continue;
+            std::size_t start = 0;  // of a run
+            while (labels[ring[start]] == labels[ring[(start + ring.size() - 1) % ring.size()]]) ++start;
+            std::rotate(ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(start), ring.end());
+            std::vector<Run> runs;
+            for (std::size_t i = 0, end; i < ring.size(); i = end) {
+                for (end = i + 1; end < ring.size() && labels[ring[end]] == labels[ring[i]];) ++end;
+                runs.push_back(run_of({ring.begin() + static_cast<std::ptrdiff_t>(i),
+                                       ring.begin() + static_cast<std::ptrdiff_t>(end)}));
+            }
+            relabel(runs);
         }
-        any = relabel(runs) || any;
-    }
-    for (const auto& [v, cell] : carved.pinched) {
-        const auto fans = fans_of(cells, labels, v, cell);
-        if (fans.size() <= 2) continue;
-        std::vector<Run> runs;
-        for (const auto& fan : fans) runs.push_back(run_of(fan));
-        any = relabel(runs) || any;
+        for (const auto& [v, cell] : places.vertices) {
+            const auto fans = fans_of(cells, labels, v, cell);
+            if (fans.size() <= 2) continue;
+            std::vector<Run> runs;
+            for (const auto& fan : fans) runs.push_back(run_of(fan));
+            relabel(runs);
+        }
+        if (changed.empty()) break;
+        any = true;
+        places = places_of(cells, changed);  // what is still tangled elsewhere stays so
     }
     return any;
 }

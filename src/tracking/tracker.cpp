@@ -30,13 +30,12 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3, kMendingSweeps = 2;
-constexpr int kFollowSweeps = 4;
+constexpr int kFollowSweeps = 3;
 constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr int kCertifyRounds = 24;
 constexpr int kFitSteps = 6;
 constexpr double kFitWideExponent = 0.5;
-constexpr int kUntanglingPasses = 4;
 constexpr double kAngleFloor = 2.0;  // resolutions: sharp edges are as round as the grid makes them
 constexpr double kLeastSpacing =
     0.02;  // resolutions: for shreds of a single voxel, where nothing coarser closes
@@ -295,11 +294,9 @@ struct Tracker::Impl {
         else
             update_labels(labels, changed, cells, particles.position, particles.normal, surface);
         mesh.carved = carve(cells, labels, particles.position);
-        if (options.reconstruction == Reconstruction::Guided)
-            for (int pass = 0; pass < kUntanglingPasses && !mesh.carved.pinched.empty() &&
-                               untangle(labels, cells, particles.position, surface, mesh.carved);
-                 ++pass)
-                mesh.carved = carve(cells, labels, particles.position);
+        if (options.reconstruction == Reconstruction::Guided &&
+            untangle(labels, cells, particles.position, surface, mesh.carved))
+            mesh.carved = carve(cells, labels, particles.position);
         std::size_t midpoint = 0;
         for (const int p : mesh.carved.particle)
             mesh.vertices.push_back(
