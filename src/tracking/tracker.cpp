@@ -29,8 +29,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
-constexpr int kSweepsPerRound = 3, kMendingSweeps = 2;
-constexpr int kFollowSweeps = 3;
+constexpr int kSweepsPerRound = 3, kMendingSweeps = 3;
+constexpr int kFollowSweeps = 2;
 constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr int kCertifyRounds = 24;
@@ -374,6 +374,11 @@ struct Tracker::Impl {
         update_spacing(particles, adjacency, evidence, l);
     }
 
+    /// Who repels whom: particles may change places with neighbours before the next mesh is made.
+    Adjacency two_rings(const FrameMesh& mesh) const {
+        return ring_of(particle_triangles(mesh.carved), particles.size()).squared();
+    }
+
     /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
     std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, const Surface& surface,
                      const SizingLimits& l) {
@@ -403,17 +408,17 @@ struct Tracker::Impl {
     }
 
     void follow(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
+    void make_room(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings,
+                   TrackedFrame& frame);
     void remember(const FrameMesh& mesh);
     void remember_errors(const FrameMesh& mesh, const std::vector<TriangleError>& errors);
-    void sample(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings, bool warm,
-                TrackedFrame& frame);
+    void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     TrackedFrame advance(const Surface& surface, const Motion& motion);
 };
 
 /// Rounds of: mesh, measure, size, relax, births and deaths. More of them the more particles are new.
-void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings,
-                           bool warm, TrackedFrame& frame) {
+void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame) {
     auto& seconds = frame.seconds;
     const double fresh =
         particles.empty() ? 0.0 : static_cast<double>(frame.seeded) / static_cast<double>(particles.size());
@@ -432,30 +437,34 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, const 
             size(mesh, adjacency, surface, l);
         }
         const StageTimer timer(seconds, "relax");
-        frame.sweeps += relax(particles, adjacency, surface, kSweepsPerRound);
+        frame.sweeps += relax(particles, two_rings(mesh), surface, kSweepsPerRound);
         if (round + 1 == rounds) break;
         auto keep = uncrowded(particles, adjacency);
         fill_sparse(particles, particle_triangles(mesh.carved), adjacency, surface, next_id);
         keep.resize(particles.size(), 1);
         particles.retain(keep);
     }
-    // Most of what fails is mended here, where its surroundings can still make room.
-    tetrahedralise(true, seconds);
-    FrameMesh mesh = carve_mesh(surface, seconds);
+}
+
+/// Most of what fails is mended here, where its surroundings can still make room.
+void Tracker::Impl::make_room(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings,
+                              TrackedFrame& frame) {
+    tetrahedralise(true, frame.seconds);
+    FrameMesh mesh = carve_mesh(surface, frame.seconds);
     Fitted none;
-    if (options.fit) fit_vertices(mesh, none, surface, seconds);
+    if (options.fit) fit_vertices(mesh, none, surface, frame.seconds);
     {
-        const StageTimer timer(seconds, "certify");
+        const StageTimer timer(frame.seconds, "certify");
         Inspector inspector(surface, l, crossings);
         Inspection inspection = inspector.inspect(mesh);
+        remember_errors(mesh, inspection.errors);
         inspector.inspect_crossings(mesh, inspection);
-        inspector.inspect_topology(mesh, inspection);
-        if (mend(mesh, inspection, surface, l) == 0) return;
+        mend(mesh, inspection, surface, l);
     }
-    tetrahedralise(false, seconds);
-    const StageTimer timer(seconds, "relax");
-    frame.sweeps +=
-        relax(particles, vertex_adjacency(dt->cells(), particles.size()), surface, kMendingSweeps);
+    tetrahedralise(false, frame.seconds);
+    mesh = carve_mesh(surface, frame.seconds);
+    const StageTimer timer(frame.seconds, "relax");
+    frame.sweeps += relax(particles, two_rings(mesh), surface, kMendingSweeps);
 }
 
 /// What the last mesh knows is good enough for the next frame's particles: no DT is needed.
@@ -531,7 +540,8 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
     else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))
         follow(surface, l, frame);
     else
-        sample(surface, l, crossings, warm, frame);
+        sample(surface, l, warm, frame);
+    if (options.method != Method::Paper) make_room(surface, l, crossings, frame);
     tetrahedralise(true, seconds);
     FrameMesh mesh;
     Fitted fitted;
@@ -545,7 +555,6 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         const bool last = options.method == Method::Paper || round == kCertifyRounds;
         const auto passes = [&] { return last || mend(mesh, inspection, surface, l) == 0; };
         inspection = inspector.inspect(mesh);
-        if (round == 0) remember_errors(mesh, inspection.errors);
         bool good = passes();
         if (good && options.fit && undo_crossing_fits(mesh)) {
             fitted.take(mesh, particles.size());

@@ -1,0 +1,232 @@
+// How the DT follows moving particles: the experiment behind the paper's table 1, and warm frames by the
+// share of particles that moved.
+//
+//     isotrack_update_strategies --particles 3000 --frames 5000 50000 500000
+//
+// First table: particles crowded at the tips of an ellipsoid spread until they rest, none is born or dies.
+// "sweeps" is what the tracker does: sweeps over all particles at once, the DT built anew after every third.
+// Energy: mean over the particles of sum exp(-r^2 / sigma^2) with sigma = d / sqrt(2), d the spacing of a
+// hexagonal packing of as many particles on that area. Second table: time to settle over that of rebuild.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "isotrack/delaunay/tetrahedralisation.h"
+#include "isotrack/sampling/coordinate_descent.h"
+#include "isotrack/sampling/particle_grid.h"
+#include "isotrack/sampling/relaxation.h"
+#include "isotrack/surface/shapes.h"
+
+namespace isotrack::bench {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+const Vec3 kHalfAxes{1.0, 0.5, 0.5};
+
+double now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+Vec3 on_ellipsoid(double theta, double phi) {
+    return {kHalfAxes.x() * std::cos(theta), kHalfAxes.y() * std::sin(theta) * std::cos(phi),
+            kHalfAxes.z() * std::sin(theta) * std::sin(phi)};
+}
+
+double area_of_ellipsoid() {
+    constexpr int kSteps = 1000;
+    double area = 0.0;
+    for (int i = 0; i < kSteps; ++i) {
+        const double a = kPi * i / kSteps, b = kPi * (i + 1) / kSteps;
+        const Vec3 p = on_ellipsoid(a, 0.0), q = on_ellipsoid(b, 0.0);  // a body of revolution
+        area += kPi * (p.y() + q.y()) * (q - p).norm();
+    }
+    return area;
+}
+
+/// Uniform in latitude and longitude: crowded at the tips, and at random.
+Particles bad_start(const Surface& surface, std::size_t count, double spacing) {
+    std::mt19937_64 random(1);
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    const auto probe = surface.probe();
+    Particles particles;
+    while (particles.size() < count) {
+        const double theta = kPi * unit(random);
+        const auto p = probe->project(on_ellipsoid(theta, 2.0 * kPi * unit(random)));
+        if (p) particles.add(*p, probe->normal(*p), spacing, static_cast<Id>(particles.size()));
+    }
+    return particles;
+}
+
+struct Packing {
+    double energy = 0.0, smallest = 1e300;  // spacing
+};
+
+Packing packing_of(const Particles& particles, double hexagonal) {
+    PointGrid grid(2.0 * hexagonal);
+    for (std::size_t i = 0; i < particles.size(); ++i)
+        grid.insert(particles.position[i], static_cast<int>(i));
+    Packing result;
+    for (std::size_t i = 0; i < particles.size(); ++i)
+        grid.for_each_within(particles.position[i], 3.0 * hexagonal, [&](int j, double d2) {
+            if (j == static_cast<int>(i)) return;
+            result.energy += std::exp(-2.0 * d2 / (hexagonal * hexagonal));
+            result.smallest = std::min(result.smallest, std::sqrt(d2));
+        });
+    result.energy /= static_cast<double>(particles.size());
+    return result;
+}
+
+class Structure final : public MovingNeighbours {
+public:
+    Structure(UpdateStrategy strategy, const std::vector<Vec3>& points)
+        : dt_(make_tetrahedralisation(strategy)) {
+        dt_->assign(points);
+    }
+    void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
+    void moved(int i, const Vec3& to) override { dt_->move(i, to); }
+    void added(int, const Vec3& at, int near) override { dt_->insert(at, near); }
+    void removed(int i) override { dt_->remove(i); }
+    void settle() override { dt_->settle(); }
+    const UpdateProfile& profile() const { return dt_->profile(); }
+
+private:
+    std::unique_ptr<Tetrahedralisation> dt_;
+};
+
+void print_row(const std::string& name, double seconds, const UpdateProfile& profile, const Packing& packing,
+               double hexagonal) {
+    const auto part = [&](const UpdateProfile::Row& row) {
+        return fmt::format("{} / {:.0f} %", row.calls, 100.0 * row.seconds / seconds);
+    };
+    fmt::print("| {} | {:.2f} | {} | {} | {} | {} | {} | {:.4f} | {:.3f} |\n", name, seconds,
+               part(profile.remove), part(profile.insert), part(profile.locate), part(profile.predicates),
+               part(profile.build), packing.energy, packing.smallest / hexagonal);
+}
+
+void spread(std::size_t count) {
+    const auto ellipsoid = shapes::ellipsoid({0, 0, 0}, kHalfAxes, 0.01);
+    const double hexagonal =
+        std::sqrt(2.0 * area_of_ellipsoid() / (std::sqrt(3.0) * static_cast<double>(count)));
+    SizingLimits limits{};
+    limits.tolerance = 1.0;
+    limits.angle = 1.0;
+    limits.min_edge = limits.max_edge = hexagonal;
+    const Particles start = bad_start(*ellipsoid, count, hexagonal);
+    const Packing before = packing_of(start, hexagonal);
+    fmt::print(
+        "{} particles on an ellipsoid, energy {:.4f} at the start, smallest spacing {:.4f} of the "
+        "hexagonal.\n\n",
+        count, before.energy, before.smallest / hexagonal);
+    fmt::print(
+        "| update | seconds | remove: calls / time | insert | locate | predicates | build | energy | "
+        "smallest spacing |\n");
+    fmt::print("|---|---:|---:|---:|---:|---:|---:|---:|---:|\n");
+    double lazy_energy = 0.0, lazy_seconds = 0.0;
+    std::size_t moved_removals = 0, lazy_removals = 0;
+    for (const UpdateStrategy strategy :
+         {UpdateStrategy::Move, UpdateStrategy::Lazy, UpdateStrategy::Rebuild, UpdateStrategy::Auto}) {
+        Particles particles = start;
+        CoordinateDescentOptions options;
+        options.population = false;
+        options.most_sweeps = 200;
+        Id next_id = static_cast<Id>(count);
+        const double from = now();
+        Structure structure(strategy, particles.position);
+        coordinate_descent(particles, structure, *ellipsoid, limits, next_id, options);
+        structure.settle();
+        const double seconds = now() - from;
+        const Packing packing = packing_of(particles, hexagonal);
+        print_row(name_of(strategy), seconds, structure.profile(), packing, hexagonal);
+        if (strategy == UpdateStrategy::Move) moved_removals = structure.profile().remove.calls;
+        if (strategy != UpdateStrategy::Lazy) continue;
+        lazy_energy = packing.energy;
+        lazy_seconds = seconds;
+        lazy_removals = structure.profile().remove.calls;
+    }
+
+    // As far as lazy came, by what the tracker does.
+    constexpr double kAlike = 1.01;
+    constexpr int kMostRounds = 100, kSweepsPerRound = 3;
+    Particles particles = start;
+    const auto dt = make_tetrahedralisation(UpdateStrategy::Auto);
+    double seconds = 0.0;
+    Packing packing;
+    int rounds = 0;
+    do {
+        const double from = now();
+        dt->assign(particles.position);
+        relax(particles, vertex_adjacency(dt->cells(), count), *ellipsoid, kSweepsPerRound);
+        seconds += now() - from;
+        packing = packing_of(particles, hexagonal);
+    } while (packing.energy > kAlike * lazy_energy && ++rounds < kMostRounds);
+    print_row("sweeps", seconds, dt->profile(), packing, hexagonal);
+    fmt::print(
+        "\nlazy removes {:.1f} times less often than move; sweeps reach its energy {:.1f} times faster.\n\n",
+        static_cast<double>(moved_removals) / static_cast<double>(std::max<std::size_t>(1, lazy_removals)),
+        lazy_seconds / seconds);
+}
+
+/// A share of relaxed particles moves by a tenth of the spacing along the surface.
+void warm_frame(std::size_t count) {
+    const auto ellipsoid = shapes::ellipsoid({0, 0, 0}, kHalfAxes, 0.01);
+    const double hexagonal =
+        std::sqrt(2.0 * area_of_ellipsoid() / (std::sqrt(3.0) * static_cast<double>(count)));
+    Particles particles = bad_start(*ellipsoid, count, hexagonal);
+    for (int round = 0; round < 4; ++round)
+        relax(particles, vertex_adjacency(tetrahedralise(particles.position), count), *ellipsoid, 3);
+    const auto probe = ellipsoid->probe();
+    for (const double share : {0.01, 0.03, 0.1, 0.3, 1.0}) {
+        std::mt19937_64 random(2);
+        std::uniform_real_distribution<double> unit(-1.0, 1.0);
+        std::vector<std::pair<int, Vec3>> moves;
+        for (std::size_t i = 0; i < count; ++i) {
+            if (0.5 * (unit(random) + 1.0) >= share) continue;
+            const Vec3 step(unit(random), unit(random), unit(random));
+            if (const auto p = probe->project(particles.position[i] + 0.1 * hexagonal * step))
+                moves.emplace_back(static_cast<int>(i), *p);
+        }
+        double rebuild = 0.0;
+        fmt::print("| {} | {:.0f} % |", count, 100.0 * share);
+        for (const UpdateStrategy strategy :
+             {UpdateStrategy::Rebuild, UpdateStrategy::Move, UpdateStrategy::Lazy, UpdateStrategy::Auto}) {
+            const auto dt = make_tetrahedralisation(strategy);
+            dt->assign(particles.position);
+            dt->cells();
+            const double from = now();
+            for (const auto& [i, p] : moves) dt->move(i, p);
+            dt->settle();
+            dt->cells();
+            const double seconds = now() - from;
+            if (strategy == UpdateStrategy::Rebuild) {
+                rebuild = seconds;
+                fmt::print(" {:.0f} |", 1e3 * seconds);
+            } else {
+                fmt::print(" {:.2f} |", seconds / rebuild);
+            }
+        }
+        fmt::print("\n");
+    }
+}
+
+}  // namespace
+}  // namespace isotrack::bench
+
+int main(int argc, char** argv) {
+    CLI::App app{"How the Delaunay tetrahedralisation follows moving particles"};
+    std::size_t particles = 3000;
+    std::vector<std::size_t> frames = {5000, 50000};
+    app.add_option("--particles", particles, "On the ellipsoid")->capture_default_str();
+    app.add_option("--frames", frames, "Sizes of warm frames")->capture_default_str();
+    CLI11_PARSE(app, argc, argv);
+    isotrack::bench::spread(particles);
+    fmt::print(
+        "| particles | moved | rebuild, ms | move, times that | lazy | auto "
+        "|\n|---:|---:|---:|---:|---:|---:|\n");
+    for (const std::size_t count : frames) isotrack::bench::warm_frame(count);
+}
