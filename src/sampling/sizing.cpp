@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace isotrack {
 namespace {
@@ -34,6 +35,26 @@ void limit_gradation(Particles& particles, const Adjacency& adjacency) {
         });
         particles.spacing.swap(next);
     }
+}
+
+/// From the distances to the neighbours next to a particle; the wanted spacing where it has too few.
+double actual_spacing(const Particles& particles, const Adjacency& adjacency, std::size_t i) {
+    constexpr double kNextTo = 2.0;  // times the distance of the nearest
+    constexpr double kSlack = 1.0;  // of a relaxed population that may grow as well as shrink
+    double least = std::numeric_limits<double>::infinity(), sum = 0.0;
+    int count = 0;
+    for (const bool nearest : {true, false})
+        for (const int j : adjacency.of(i)) {
+            if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
+            const double d = (particles.position[j] - particles.position[i]).norm();
+            if (nearest) {
+                least = std::min(least, d);
+            } else if (d < kNextTo * least) {
+                sum += d;
+                ++count;
+            }
+        }
+    return count > 2 ? kSlack * sum / count : particles.spacing[i];
 }
 
 /// The spacing that a quarter of the particles are below.
@@ -86,8 +107,11 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
         const double h = particles.spacing[i], e = evidence.error[i];
         const double aim =
             kShare * limits.tolerance * std::min(1.0, std::pow(wide / h, limits.wide_exponent));
-        const double factor = e < 0.0 ? 1.0 : std::clamp(e / aim, 0.5, 2.0);
-        log_k2[i] = std::log(factor / (h * h));
+        if (e < 0.0)
+            log_k2[i] = -2.0 * std::log(h);
+        else
+            log_k2[i] =
+                std::log(std::clamp(e / aim, 0.5, 2.0) / (h * actual_spacing(particles, adjacency, i)));
     });
     std::vector<double> next(n);
     for_each_particle(n, [&](std::size_t i) {

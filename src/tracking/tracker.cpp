@@ -30,6 +30,8 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3, kMendingSweeps = 3;
+constexpr int kMostMendings = 3;
+constexpr double kFew = 0.03;  // of the particles: few enough to be added by certify, without relaxation
 constexpr int kFollowSweeps = 2;
 constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
@@ -408,8 +410,8 @@ struct Tracker::Impl {
     }
 
     void follow(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
-    void make_room(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings,
-                   TrackedFrame& frame);
+    std::size_t make_room(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings,
+                          TrackedFrame& frame);
     void remember(const FrameMesh& mesh);
     void remember_errors(const FrameMesh& mesh, const std::vector<TriangleError>& errors);
     void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
@@ -446,25 +448,28 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool w
     }
 }
 
-/// Most of what fails is mended here, where its surroundings can still make room.
-void Tracker::Impl::make_room(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings,
-                              TrackedFrame& frame) {
+/// Adds particles where the mesh fails and relaxes: here their surroundings can still make room. Returns how
+/// many.
+std::size_t Tracker::Impl::make_room(const Surface& surface, const SizingLimits& l,
+                                     const CrossingGrid& crossings, TrackedFrame& frame) {
     tetrahedralise(true, frame.seconds);
     FrameMesh mesh = carve_mesh(surface, frame.seconds);
     Fitted none;
     if (options.fit) fit_vertices(mesh, none, surface, frame.seconds);
+    std::size_t added = 0;
     {
         const StageTimer timer(frame.seconds, "certify");
         Inspector inspector(surface, l, crossings);
         Inspection inspection = inspector.inspect(mesh);
         remember_errors(mesh, inspection.errors);
         inspector.inspect_crossings(mesh, inspection);
-        mend(mesh, inspection, surface, l);
+        added = mend(mesh, inspection, surface, l);
     }
     tetrahedralise(false, frame.seconds);
     mesh = carve_mesh(surface, frame.seconds);
     const StageTimer timer(frame.seconds, "relax");
     frame.sweeps += relax(particles, two_rings(mesh), surface, kMendingSweeps);
+    return added;
 }
 
 /// What the last mesh knows is good enough for the next frame's particles: no DT is needed.
@@ -541,7 +546,11 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         follow(surface, l, frame);
     else
         sample(surface, l, warm, frame);
-    if (options.method != Method::Paper) make_room(surface, l, crossings, frame);
+    if (options.method != Method::Paper)
+        for (int mending = 0; mending < kMostMendings; ++mending)
+            if (static_cast<double>(make_room(surface, l, crossings, frame)) <
+                kFew * static_cast<double>(particles.size()))
+                break;
     tetrahedralise(true, seconds);
     FrameMesh mesh;
     Fitted fitted;

@@ -283,6 +283,19 @@ TEST(UpdateSpacing, GetsSmallerTheLargerTheError) {
     limits.angle = 1.0;
     limits.min_edge = 0.01;
     limits.max_edge = 10.0;
+    // The actual spacing: the mean distance to neighbours within twice that of the nearest.
+    double least_actual = 1e300, most_actual = 0.0;
+    for (std::size_t i = 0; i < start.size(); ++i) {
+        const double nearest = nearest_distance(start, i);
+        double sum = 0.0;
+        int count = 0;
+        for (const int j : adjacency.of(i)) {
+            const double d = (start.position[j] - start.position[i]).norm();
+            if (d < 2.0 * nearest && start.normal[i].dot(start.normal[j]) > 0.0) sum += d, ++count;
+        }
+        least_actual = std::min(least_actual, sum / count);
+        most_actual = std::max(most_actual, sum / count);
+    }
     double last = 1e300, no_evidence = 0.0;
     for (const double error : {-1.0, 0.001, 0.004, 0.007, 0.01, 0.014, 0.1}) {
         Particles particles = start;
@@ -291,8 +304,10 @@ TEST(UpdateSpacing, GetsSmallerTheLargerTheError) {
         evidence.thickness.assign(particles.size(), std::numeric_limits<double>::infinity());
         update_spacing(particles, adjacency, evidence, limits);
         const double h = particles.spacing[0];
-        EXPECT_GE(h, 0.19 / std::sqrt(2.0) - 1e-12) << error;  // 1/h^2 changes by at most 2
-        EXPECT_LE(h, 0.19 * std::sqrt(2.0) + 1e-12) << error;
+        if (error >= 0.0) {  // 1 / h^2 is at least half, at most twice 1 / (wanted x actual)
+            EXPECT_GE(h, std::sqrt(0.19 * least_actual / 2.0) - 1e-12) << error;
+            EXPECT_LE(h, std::sqrt(0.19 * most_actual * 2.0) + 1e-12) << error;
+        }
         if (error < 0.0) {
             no_evidence = h;
             continue;

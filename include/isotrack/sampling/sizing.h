@@ -38,9 +38,10 @@ double spacing_from_curvature(Surface::Probe& probe, const Vec3& p, const Vec3& 
 /// The paper's k_nd: sqrt(max over neighbours on the same side of (1 - n_i . n_j) / r_ij^2), 1 / world units.
 double normal_deviation(const Particles& particles, const Adjacency& adjacency, std::size_t i);
 
-/// Feeds the measured error back: 1/h^2 grows in proportion to error / (share of the tolerance), by a factor
-/// of at most 2 either way; then the angle, the thickness and the limits bound it, and the gradation h_i <=
-/// h_j + 0.25 r_ij smooths it.
+/// Feeds the measured error back: 1/h^2 becomes error / (share of the tolerance), at least 1/2 and at most 2,
+/// over the wanted spacing times the actual one, since the error is that of the actual and a population with
+/// a dead zone lags behind what is wanted; then the angle, the thickness and the limits bound it, and the
+/// gradation h_i <= h_j + 0.25 r_ij smooths it.
 void update_spacing(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence,
                     const SizingLimits& limits);
 
