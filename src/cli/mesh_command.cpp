@@ -162,6 +162,14 @@ void add_mesh_command(CLI::App& app, int& result) {
                      "Convection guided by the level set, or of the particles alone")
         ->transform(CLI::CheckedTransformer(reconstructions).description(""))
         ->option_text("guided|pure [guided]");
+    const std::map<std::string, UpdateStrategy> strategies{{"auto", UpdateStrategy::Auto},
+                                                           {"rebuild", UpdateStrategy::Rebuild},
+                                                           {"lazy", UpdateStrategy::Lazy},
+                                                           {"move", UpdateStrategy::Move}};
+    mesh->add_option("--delaunay", a->options.delaunay,
+                     "How the DT follows the particles: what is cheaper, built anew, the paper's two ways")
+        ->transform(CLI::CheckedTransformer(strategies).description(""))
+        ->option_text("auto|rebuild|lazy|move [auto]");
     const std::map<std::string, Border> borders{{"close", Border::Close}, {"open", Border::Open}};
     mesh->add_option(
             "--border", a->options.border,

@@ -219,6 +219,21 @@ void LivingDelaunay::relocate(int number, const Vec3& p) {
     impl_->vertex[number] = v;
 }
 
+void LivingDelaunay::renumber(const std::vector<int>& to) {
+    std::vector<Vertex> vertex;
+    for (std::size_t i = 0; i < impl_->vertex.size(); ++i) {
+        if (to[i] < 0) continue;
+        vertex.resize(to[i] + 1);
+        vertex[to[i]] = impl_->vertex[i];
+        if (vertex[to[i]] != Vertex()) vertex[to[i]]->info() = to[i];
+    }
+    impl_->vertex.swap(vertex);
+    if (!impl_->mirrored) return;
+    for (auto& cell : impl_->flat.vertices)
+        for (int& v : cell)
+            if (v >= 0) v = to[v];
+}
+
 std::size_t LivingDelaunay::size() const {
     return impl_->dt.number_of_vertices();
 }

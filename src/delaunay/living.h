@@ -26,6 +26,9 @@ public:
     bool has(int number) const;
     std::size_t size() const;  ///< Vertices.
 
+    /// Vertex i becomes to[i]; to[i] < 0: there is none.
+    void renumber(const std::vector<int>& to);
+
     Vec3 position(int number) const;
     /// Sets a position as it is; the triangulation around it may be none any more.
     void set_position(int number, const Vec3& p);

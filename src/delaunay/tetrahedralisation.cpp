@@ -24,6 +24,21 @@ public:
         dt_.assign(points);
         assigned();
     }
+    void compact() override {
+        settle();
+        std::vector<int> to(points_.size(), -1);
+        int count = 0;
+        for (std::size_t v = 0; v < points_.size(); ++v) {
+            if (!there_[v]) continue;
+            points_[count] = points_[v];
+            to[v] = count++;
+        }
+        if (count == static_cast<int>(points_.size())) return;
+        points_.resize(count);
+        there_.assign(count, 1);
+        dt_.renumber(to);
+        assigned();
+    }
     const Tetrahedra& cells() override { return dt_.cells(); }
     std::vector<int> take_changed() override { return dt_.take_changed(); }
     const UpdateProfile& profile() const override { return dt_.profile(); }

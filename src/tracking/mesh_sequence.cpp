@@ -89,6 +89,7 @@ TrackerOptions tracker_options(const MeshSequenceOptions& options, double voxel_
     if (options.max_edge) result.max_edge = options.max_edge->in_world(voxel_size);
     result.method = options.method;
     result.reconstruction = options.reconstruction;
+    result.delaunay = options.delaunay;
     result.border = options.border;
     result.fit = options.fit;
     result.seed = options.seed;
@@ -148,6 +149,7 @@ std::map<std::string, std::string> effective_settings(const MeshSequenceOptions&
     s["angle"] = std::to_string(std::lround(t.angle_deg.value_or(default_angle_deg(t.method)))) + " degrees";
     s["method"] = options.method == Method::Paper ? "paper" : "tolerance";
     s["border"] = options.border == Border::Open ? "open" : "close";
+    s["delaunay"] = name_of(options.delaunay);
     s["reconstruct"] = options.reconstruction == Reconstruction::Pure ? "pure" : "guided";
     s["fit"] = options.fit ? "on" : "off";
     s["seed"] = std::to_string(options.seed);

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <unordered_set>
 
 #include "isotrack/delaunay/tetrahedralisation.h"
@@ -84,8 +85,8 @@ std::vector<double> thickness_of(const Particles& particles, const Tetrahedra& c
 /// The DT as the paper's descent sees it. The DT numbers its vertices as the particles are numbered.
 class DelaunayNeighbours final : public MovingNeighbours {
 public:
-    explicit DelaunayNeighbours(const std::vector<Vec3>& points)
-        : dt_(make_tetrahedralisation(UpdateStrategy::Lazy)) {
+    DelaunayNeighbours(UpdateStrategy strategy, const std::vector<Vec3>& points)
+        : dt_(make_tetrahedralisation(strategy)) {
         dt_->assign(points);
     }
     void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
@@ -176,10 +177,9 @@ struct Tracker::Impl {
     TrackerOptions options;
     Particles particles;
     Id next_id = 0;
-    std::unique_ptr<Tetrahedralisation> dt = make_tetrahedralisation(UpdateStrategy::Auto);
+    std::unique_ptr<Tetrahedralisation> dt;
     CellLabels labels;
-    std::size_t in_dt = 0;  // particles that are in the DT, by their index
-    std::vector<int> near;  // per particle not yet in it: one close by, or -1
+    std::vector<Id> in_dt;  // the particles whose DT it is
     Memory memory;
 
     explicit Impl(const TrackerOptions& o) : options(o) {
@@ -193,6 +193,13 @@ struct Tracker::Impl {
             throw OptionError("the largest edge must be a positive length");
         if (o.min_edge && o.max_edge && *o.min_edge > *o.max_edge)
             throw OptionError("the smallest edge is longer than the largest");
+        // In the paper's method the descent has a DT of its own; this one is for the mesh.
+        dt = make_tetrahedralisation(o.method == Method::Paper ? UpdateStrategy::Rebuild : o.delaunay);
+    }
+
+    UpdateStrategy strategy() const {
+        const bool as_in_paper = options.method == Method::Paper && options.delaunay == UpdateStrategy::Auto;
+        return as_in_paper ? UpdateStrategy::Lazy : options.delaunay;
     }
 
     SizingLimits limits(const Surface& surface) const {
@@ -270,27 +277,40 @@ struct Tracker::Impl {
         return n - particles.size();
     }
 
-    /// Brings the DT to the particles, all of them anew or only those that were added at the end.
-    void tetrahedralise(bool anew, std::map<std::string, double>& seconds) {
+    /// Brings the DT to the particles. `moved`: what was known of its cells does not hold any more.
+    void tetrahedralise(bool moved, std::map<std::string, double>& seconds) {
         const StageTimer timer(seconds, "delaunay");
         round_to_float(particles);
-        if (anew) {
+        if (moved) labels.clear();
+        if (in_dt.empty()) {
             dt->assign(particles.position);
-            labels.clear();
         } else {
-            for (std::size_t i = in_dt; i < particles.size(); ++i) dt->insert(particles.position[i], near[i]);
-            dt->settle();
+            // Ids ascend, in the DT as among the particles.
+            std::size_t next = 0;
+            for (std::size_t v = 0; v < in_dt.size(); ++v) {
+                if (next == particles.size() || particles.id[next] != in_dt[v]) {
+                    dt->remove(static_cast<int>(v));
+                    continue;
+                }
+                if (moved) dt->move(static_cast<int>(v), particles.position[next]);
+                ++next;
+            }
+            for (; next < particles.size(); ++next) dt->insert(particles.position[next], -1);
+            dt->compact();
         }
-        in_dt = particles.size();
-        near.assign(in_dt, -1);
+        in_dt = particles.id;
     }
 
     /// The mesh of the DT as it is, before any fit.
     FrameMesh carve_mesh(const Surface& surface, std::map<std::string, double>& seconds) {
         const StageTimer timer(seconds, "convect");
         FrameMesh mesh;
-        const std::vector<int> changed = dt->take_changed();
+        std::vector<int> changed = dt->take_changed();
         const Tetrahedra& cells = dt->cells();
+        if (labels.empty()) {
+            changed.resize(cells.size());
+            std::iota(changed.begin(), changed.end(), 0);
+        }
         if (options.reconstruction == Reconstruction::Pure)
             labels = pure_convection(cells, particles.position);
         else
@@ -385,11 +405,8 @@ struct Tracker::Impl {
     std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, const Surface& surface,
                      const SizingLimits& l) {
         const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
-        const std::size_t added =
-            densify(particles, shortages(mesh, inspection, dt->cells(), particles, surface, l), surface,
-                    least, next_id);
-        near.resize(particles.size(), -1);
-        return added;
+        return densify(particles, shortages(mesh, inspection, dt->cells(), particles, surface, l), surface,
+                       least, next_id);
     }
 
     /// The newborn move like the neighbours that were there before; alone among newborn they rest.
@@ -510,7 +527,7 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
     constexpr int kMostColdSweeps = 60, kMostWarmSweeps = 12;
     if (particles.empty()) return;
     const StageTimer timer(frame.seconds, "relax");
-    DelaunayNeighbours structure(particles.position);
+    DelaunayNeighbours structure(strategy(), particles.position);
     CoordinateDescentOptions o;
     o.most_sweeps = warm ? kMostWarmSweeps : kMostColdSweeps;
     o.seed = options.seed;
@@ -523,8 +540,8 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
 TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion) {
     TrackedFrame frame;
     auto& seconds = frame.seconds;
-    frame.delaunay_strategy =
-        name_of(options.method == Method::Paper ? UpdateStrategy::Lazy : UpdateStrategy::Auto);
+    frame.delaunay_strategy = name_of(strategy());
+    const std::size_t relocated = dt->profile().relocated;
     const SizingLimits l = limits(surface);
     const std::vector<Id> before = particles.id;
     const bool warm = !particles.empty();
@@ -580,6 +597,7 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         }
         tetrahedralise(false, seconds);
     }
+    frame.relocated += dt->profile().relocated - relocated;
     report(mesh, inspection, l, frame);
     remember(mesh);
     remove_specks(mesh, inspection);

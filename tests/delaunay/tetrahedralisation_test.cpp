@@ -271,6 +271,13 @@ TEST_P(UpdateStrategies, EqualsAFreshBuildAfterAnyHistory) {
                 ASSERT_EQ(cells.neighbours[n][cells.mirror_index(static_cast<int>(c), k)],
                           static_cast<int>(c));
             }
+        if (round % 5 == 4) {
+            dt->compact();
+            points = left;
+            alive.assign(points.size(), 1);
+            ASSERT_EQ(cell_places(cells, points), cell_places(tetrahedralise(left), left));
+            seen = cells.vertices;  // renamed, all of them
+        }
         seen.resize(cells.size(), {-9, -9, -9, -9});
         for (const int c : dt->take_changed()) seen[c] = cells.vertices[c];
         ASSERT_EQ(seen, cells.vertices);

@@ -370,6 +370,31 @@ TEST(Tracker, SamplesAsInThePaper) {
     }
 }
 
+TEST(Tracker, MayFollowTheParticlesInAnyWay) {
+    TrackerOptions options = with_tolerance(0.02);
+    for (const Method method : {Method::Tolerance, Method::Paper})
+        for (const UpdateStrategy strategy :
+             {UpdateStrategy::Auto, UpdateStrategy::Rebuild, UpdateStrategy::Lazy, UpdateStrategy::Move}) {
+            options.method = method;
+            options.delaunay = strategy;
+            options.angle_deg = 20.0;
+            Tracker tracker(options);
+            for (int f = 0; f < 3; ++f) {
+                const TrackedFrame frame = tracker.advance(*sphere_at({0.03 * f, 0, 0}));
+                expect_sound(frame, 1, 2, std::string(name_of(strategy)) + " frame " + std::to_string(f));
+                EXPECT_EQ(frame.delaunay_strategy, method == Method::Paper && strategy == UpdateStrategy::Auto
+                                                       ? "lazy"
+                                                       : name_of(strategy));
+                if (strategy == UpdateStrategy::Rebuild) {
+                    EXPECT_EQ(frame.relocated, 0u);
+                }
+                if (strategy == UpdateStrategy::Move && f > 0) {
+                    EXPECT_GT(frame.relocated, 0u);
+                }
+            }
+        }
+}
+
 TEST(Tracker, GivesEveryShapeItsTopology) {
     const auto near = shapes::unite(
         {shapes::sphere(Vec3(-0.44, 0, 0), 0.4, 0.04), shapes::sphere(Vec3(0.44, 0, 0), 0.4, 0.04)});

@@ -63,7 +63,7 @@ struct UpdateProfile {
 };
 
 /// Points that move, come and go, and their DT. Vertices are numbered by the caller's order and keep their
-/// number until they are removed. Between calls the DT may lag behind the points, as the strategy likes;
+/// number until `compact`. Between calls the DT may lag behind the points, as the strategy likes;
 /// after `settle` it is exact. Not for concurrent use.
 class Tetrahedralisation {
 public:
@@ -83,6 +83,10 @@ public:
 
     /// Makes the DT that of the points where they are now.
     virtual void settle() = 0;
+
+    /// Settles, then numbers the vertices that are left anew: in their order, from 0. The cells keep their
+    /// slots.
+    virtual void compact() = 0;
 
     /// The cells as of the last `settle`, none when the points span no volume. A vertex on the very place of
     /// another belongs to no cell. A slot that lost its cell has only infinite vertices and is its own

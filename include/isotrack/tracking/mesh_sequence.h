@@ -37,6 +37,7 @@ struct MeshSequenceOptions {
     Method method = Method::Tolerance;
     Reconstruction reconstruction = Reconstruction::Guided;
     Border border = Border::Close;
+    UpdateStrategy delaunay = UpdateStrategy::Auto;
     bool fit = false;
     std::uint64_t seed = 1;
     std::optional<std::string> grid, velocity_grid;  ///< NAME or NAME[i]; unset: chosen by `choose_grid`.

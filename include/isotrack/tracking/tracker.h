@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/sampling/particles.h"
 #include "isotrack/surface/surface.h"
 #include "isotrack/types.h"
@@ -45,6 +46,7 @@ struct TrackerOptions {
     Method method = Method::Tolerance;
     Reconstruction reconstruction = Reconstruction::Guided;
     Border border = Border::Close;
+    UpdateStrategy delaunay = UpdateStrategy::Auto;  ///< In the paper's method Auto is Lazy, as there.
     bool fit = false;  ///< Vertices leave the surface so that the triangles are nearer to it; particles stay.
     std::uint64_t seed = 1;  ///< Same seed, same surfaces: same meshes, at any thread count.
 };
