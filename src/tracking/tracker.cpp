@@ -32,7 +32,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3, kMendingSweeps = 3;
 constexpr int kMostMendings = 3;
-constexpr double kFew = 0.03;  // of the particles: few enough to be added by certify, without relaxation
+constexpr double kFew = 0.015;  // of the particles: few enough to be added by certify, without relaxation
 constexpr int kFollowSweeps = 2;
 constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
@@ -428,7 +428,7 @@ struct Tracker::Impl {
 
     void follow(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
     std::size_t make_room(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings,
-                          TrackedFrame& frame);
+                          bool thorough, TrackedFrame& frame);
     void remember(const FrameMesh& mesh);
     void remember_errors(const FrameMesh& mesh, const std::vector<TriangleError>& errors);
     void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
@@ -468,7 +468,7 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool w
 /// Adds particles where the mesh fails and relaxes: here their surroundings can still make room. Returns how
 /// many.
 std::size_t Tracker::Impl::make_room(const Surface& surface, const SizingLimits& l,
-                                     const CrossingGrid& crossings, TrackedFrame& frame) {
+                                     const CrossingGrid& crossings, bool thorough, TrackedFrame& frame) {
     tetrahedralise(true, frame.seconds);
     FrameMesh mesh = carve_mesh(surface, frame.seconds);
     Fitted none;
@@ -479,7 +479,7 @@ std::size_t Tracker::Impl::make_room(const Surface& surface, const SizingLimits&
         Inspector inspector(surface, l, crossings);
         Inspection inspection = inspector.inspect(mesh);
         remember_errors(mesh, inspection.errors);
-        inspector.inspect_crossings(mesh, inspection);
+        if (thorough) inspector.inspect_crossings(mesh, inspection);
         added = mend(mesh, inspection, surface, l);
     }
     tetrahedralise(false, frame.seconds);
@@ -565,7 +565,7 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         sample(surface, l, warm, frame);
     if (options.method != Method::Paper)
         for (int mending = 0; mending < kMostMendings; ++mending)
-            if (static_cast<double>(make_room(surface, l, crossings, frame)) <
+            if (static_cast<double>(make_room(surface, l, crossings, mending > 0, frame)) <
                 kFew * static_cast<double>(particles.size()))
                 break;
     tetrahedralise(true, seconds);
