@@ -86,18 +86,23 @@ std::vector<double> thickness_of(const Particles& particles, const Tetrahedra& c
 class DelaunayNeighbours final : public MovingNeighbours {
 public:
     DelaunayNeighbours(UpdateStrategy strategy, const std::vector<Vec3>& points)
-        : dt_(make_tetrahedralisation(strategy)) {
+        : dt_(make_tetrahedralisation(strategy)),
+          notes_only_(strategy == UpdateStrategy::Rebuild || strategy == UpdateStrategy::Auto) {
         dt_->assign(points);
     }
     void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
     void moved(int i, const Vec3& to) override { dt_->move(i, to); }
     void added(int, const Vec3& at, int near) override { dt_->insert(at, near); }
     void removed(int i) override { dt_->remove(i); }
-    void settle() override { dt_->settle(); }
+    /// The paper's strategies follow by themselves; what lazy puts off is not to be done.
+    void settle() override {
+        if (notes_only_) dt_->settle();
+    }
     std::size_t relocated() const { return dt_->profile().relocated; }
 
 private:
     std::unique_ptr<Tetrahedralisation> dt_;
+    bool notes_only_;
 };
 
 /// What the last mesh says about its particles; entries follow those of the particles.

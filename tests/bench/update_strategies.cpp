@@ -85,18 +85,24 @@ Packing packing_of(const Particles& particles, double hexagonal) {
 class Structure final : public MovingNeighbours {
 public:
     Structure(UpdateStrategy strategy, const std::vector<Vec3>& points)
-        : dt_(make_tetrahedralisation(strategy)) {
+        : dt_(make_tetrahedralisation(strategy)),
+          notes_only_(strategy == UpdateStrategy::Rebuild || strategy == UpdateStrategy::Auto) {
         dt_->assign(points);
     }
     void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
     void moved(int i, const Vec3& to) override { dt_->move(i, to); }
     void added(int, const Vec3& at, int near) override { dt_->insert(at, near); }
     void removed(int i) override { dt_->remove(i); }
-    void settle() override { dt_->settle(); }
+    /// What lazy puts off is not to be done before the end.
+    void settle() override {
+        if (notes_only_) dt_->settle();
+    }
+    void finish() { dt_->settle(); }
     const UpdateProfile& profile() const { return dt_->profile(); }
 
 private:
     std::unique_ptr<Tetrahedralisation> dt_;
+    bool notes_only_;
 };
 
 void print_row(const std::string& name, double seconds, const UpdateProfile& profile, const Packing& packing,
@@ -139,7 +145,7 @@ void spread(std::size_t count) {
         const double from = now();
         Structure structure(strategy, particles.position);
         coordinate_descent(particles, structure, *ellipsoid, limits, next_id, options);
-        structure.settle();
+        structure.finish();
         const double seconds = now() - from;
         const Packing packing = packing_of(particles, hexagonal);
         print_row(name_of(strategy), seconds, structure.profile(), packing, hexagonal);

@@ -20,7 +20,7 @@ public:
     virtual void moved(int i, const Vec3& to) = 0;
     virtual void added(int i, const Vec3& at, int near) = 0;  ///< i is the count of particles before.
     virtual void removed(int i) = 0;
-    virtual void settle() = 0;  ///< Called about once per sweep.
+    virtual void settle() = 0;  ///< Called about once per sweep, for structures that only note changes.
 };
 
 struct CoordinateDescentOptions {
