@@ -20,6 +20,7 @@
 #include "isotrack/meshing/untangle.h"
 #include "isotrack/sampling/coordinate_descent.h"
 #include "isotrack/sampling/cover.h"
+#include "isotrack/sampling/delaunay_neighbours.h"
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
@@ -81,29 +82,6 @@ std::vector<double> thickness_of(const Particles& particles, const Tetrahedra& c
             }
     return th;
 }
-
-/// The DT as the paper's descent sees it. The DT numbers its vertices as the particles are numbered.
-class DelaunayNeighbours final : public MovingNeighbours {
-public:
-    DelaunayNeighbours(UpdateStrategy strategy, const std::vector<Vec3>& points)
-        : dt_(make_tetrahedralisation(strategy)),
-          notes_only_(strategy == UpdateStrategy::Rebuild || strategy == UpdateStrategy::Auto) {
-        dt_->assign(points);
-    }
-    void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
-    void moved(int i, const Vec3& to) override { dt_->move(i, to); }
-    void added(int, const Vec3& at, int near) override { dt_->insert(at, near); }
-    void removed(int i) override { dt_->remove(i); }
-    /// The paper's strategies follow by themselves; what lazy puts off is not to be done.
-    void settle() override {
-        if (notes_only_) dt_->settle();
-    }
-    std::size_t relocated() const { return dt_->profile().relocated; }
-
-private:
-    std::unique_ptr<Tetrahedralisation> dt_;
-    bool notes_only_;
-};
 
 /// What the last mesh says about its particles; entries follow those of the particles.
 struct Memory {
@@ -539,7 +517,7 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
     const std::size_t count = particles.size();
     const CoordinateDescentReport report = coordinate_descent(particles, structure, surface, l, next_id, o);
     frame.sweeps = static_cast<int>(report.steps / std::max<std::size_t>(1, count));
-    frame.relocated = structure.relocated();
+    frame.relocated = structure.dt().profile().relocated;
 }
 
 TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion) {

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "isotrack/delaunay/tetrahedralisation.h"
-#include "isotrack/sampling/coordinate_descent.h"
+#include "isotrack/sampling/delaunay_neighbours.h"
 #include "isotrack/sampling/particle_grid.h"
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/surface/shapes.h"
@@ -82,29 +82,6 @@ Packing packing_of(const Particles& particles, double hexagonal) {
     return result;
 }
 
-class Structure final : public MovingNeighbours {
-public:
-    Structure(UpdateStrategy strategy, const std::vector<Vec3>& points)
-        : dt_(make_tetrahedralisation(strategy)),
-          notes_only_(strategy == UpdateStrategy::Rebuild || strategy == UpdateStrategy::Auto) {
-        dt_->assign(points);
-    }
-    void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
-    void moved(int i, const Vec3& to) override { dt_->move(i, to); }
-    void added(int, const Vec3& at, int near) override { dt_->insert(at, near); }
-    void removed(int i) override { dt_->remove(i); }
-    /// What lazy puts off is not to be done before the end.
-    void settle() override {
-        if (notes_only_) dt_->settle();
-    }
-    void finish() { dt_->settle(); }
-    const UpdateProfile& profile() const { return dt_->profile(); }
-
-private:
-    std::unique_ptr<Tetrahedralisation> dt_;
-    bool notes_only_;
-};
-
 void print_row(const std::string& name, double seconds, const UpdateProfile& profile, const Packing& packing,
                double hexagonal) {
     const auto part = [&](const UpdateProfile::Row& row) {
@@ -143,17 +120,17 @@ void spread(std::size_t count) {
         options.most_sweeps = 200;
         Id next_id = static_cast<Id>(count);
         const double from = now();
-        Structure structure(strategy, particles.position);
+        DelaunayNeighbours structure(strategy, particles.position);
         coordinate_descent(particles, structure, *ellipsoid, limits, next_id, options);
-        structure.finish();
+        structure.dt().settle();
         const double seconds = now() - from;
         const Packing packing = packing_of(particles, hexagonal);
-        print_row(name_of(strategy), seconds, structure.profile(), packing, hexagonal);
-        if (strategy == UpdateStrategy::Move) moved_removals = structure.profile().remove.calls;
+        print_row(name_of(strategy), seconds, structure.dt().profile(), packing, hexagonal);
+        if (strategy == UpdateStrategy::Move) moved_removals = structure.dt().profile().remove.calls;
         if (strategy != UpdateStrategy::Lazy) continue;
         lazy_energy = packing.energy;
         lazy_seconds = seconds;
-        lazy_removals = structure.profile().remove.calls;
+        lazy_removals = structure.dt().profile().remove.calls;
     }
 
     // As far as lazy came, by what the tracker does.

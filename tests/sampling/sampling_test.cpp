@@ -13,8 +13,8 @@
 
 #include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/sampling/adjacency.h"
-#include "isotrack/sampling/coordinate_descent.h"
 #include "isotrack/sampling/cover.h"
+#include "isotrack/sampling/delaunay_neighbours.h"
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
@@ -549,23 +549,6 @@ TEST(Densify, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
             EXPECT_GE((particles.position[i] - particles.position[j]).norm(), 0.7 * 0.05);
 }
 
-/// The DT, as the descent asks for it.
-class DelaunayNeighbours final : public MovingNeighbours {
-public:
-    explicit DelaunayNeighbours(const std::vector<Vec3>& points)
-        : dt_(make_tetrahedralisation(UpdateStrategy::Rebuild)) {
-        dt_->assign(points);
-    }
-    void neighbours(int i, std::vector<int>& result) override { dt_->neighbours(i, result); }
-    void moved(int i, const Vec3& to) override { dt_->move(i, to); }
-    void added(int i, const Vec3& at, int near) override { EXPECT_EQ(dt_->insert(at, near), i); }
-    void removed(int i) override { dt_->remove(i); }
-    void settle() override { dt_->settle(); }
-
-private:
-    std::unique_ptr<Tetrahedralisation> dt_;
-};
-
 TEST(CoordinateDescent, SpreadsParticlesOverAnEllipsoidByItsCurvature) {
     const auto ellipsoid = shapes::ellipsoid({0, 0, 0}, {1.0, 0.5, 0.5}, 0.02);
     SizingLimits limits{};
@@ -578,7 +561,7 @@ TEST(CoordinateDescent, SpreadsParticlesOverAnEllipsoidByItsCurvature) {
     cover(particles, *ellipsoid, CrossingGrid(*ellipsoid), limits, 1, next_id);
     const Id first_new = next_id;
     const std::size_t start = particles.size();
-    DelaunayNeighbours structure(particles.position);
+    DelaunayNeighbours structure(UpdateStrategy::Rebuild, particles.position);
     const CoordinateDescentReport report =
         coordinate_descent(particles, structure, *ellipsoid, limits, next_id);
     EXPECT_TRUE(report.converged);
@@ -611,7 +594,7 @@ TEST(CoordinateDescent, KeepsItsBudgetAndItsPopulationWhenTold) {
     limits.angle = 0.3;
     for (const int sweeps : {0, 1, 3}) {
         Particles particles = random_on_unit_sphere(150, 0.3);
-        DelaunayNeighbours structure(particles.position);
+        DelaunayNeighbours structure(UpdateStrategy::Rebuild, particles.position);
         CoordinateDescentOptions options;
         options.most_sweeps = sweeps;
         options.population = false;
@@ -624,7 +607,7 @@ TEST(CoordinateDescent, KeepsItsBudgetAndItsPopulationWhenTold) {
         EXPECT_FALSE(report.converged);
     }
     Particles none;
-    DelaunayNeighbours structure(none.position);
+    DelaunayNeighbours structure(UpdateStrategy::Rebuild, none.position);
     Id next_id = 0;
     EXPECT_TRUE(coordinate_descent(none, structure, *sphere, limits, next_id).converged);
 }
@@ -636,7 +619,7 @@ TEST(CoordinateDescent, DependsOnItsSeedAlone) {
     limits.angle = 0.2;  // more particles than there are
     const auto run = [&](std::uint64_t seed) {
         Particles particles = random_on_unit_sphere(100, 0.3);
-        DelaunayNeighbours structure(particles.position);
+        DelaunayNeighbours structure(UpdateStrategy::Rebuild, particles.position);
         CoordinateDescentOptions options;
         options.seed = seed;
         Id next_id = 100;
