@@ -1,7 +1,5 @@
 #include "isotrack/delaunay/tetrahedralisation.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 
 #include "delaunay/living.h"
@@ -222,31 +220,13 @@ Tetrahedra tetrahedralise(const std::vector<Vec3>& points) {
 }
 
 Adjacency vertex_adjacency(const Tetrahedra& cells, std::size_t count) {
-    // First every pair of every cell, with repeats, then each list sorted and made unique in its place.
-    std::vector<int> first(count + 1, 0);
-    for (const auto& cell : cells.vertices)
-        for (const int v : cell)
-            if (v >= 0) first[v + 1] += 3;
-    for (std::size_t i = 0; i < count; ++i) first[i + 1] += first[i];
-    std::vector<int> pairs(first[count]), end(first.begin(), first.end() - 1);
+    std::vector<std::pair<int, int>> pairs;
+    pairs.reserve(12 * cells.size());
     for (const auto& cell : cells.vertices)
         for (const int v : cell)
             for (const int w : cell)
-                if (v >= 0 && w >= 0 && v != w) pairs[end[v]++] = w;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1024), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            const auto from = pairs.begin() + first[i];
-            std::sort(from, pairs.begin() + end[i]);
-            end[i] = static_cast<int>(std::unique(from, pairs.begin() + end[i]) - pairs.begin());
-        }
-    });
-    Adjacency result;
-    result.first.reserve(count + 1);
-    for (std::size_t i = 0; i < count; ++i) {
-        result.adjacent.insert(result.adjacent.end(), pairs.begin() + first[i], pairs.begin() + end[i]);
-        result.first.push_back(static_cast<int>(result.adjacent.size()));
-    }
-    return result;
+                if (v >= 0 && w >= 0 && v != w) pairs.emplace_back(v, w);
+    return from_pairs(pairs, count);
 }
 
 const char* name_of(UpdateStrategy strategy) {

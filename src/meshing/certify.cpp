@@ -1,6 +1,5 @@
 #include "isotrack/meshing/certify.h"
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -8,9 +7,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <memory>
 
 #include "delaunay/circumcentre.h"
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
@@ -68,9 +67,9 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps, double refine_above) {
     std::vector<TriangleError> errors(triangles.size());
-    tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
+    ThreadProbes probes(surface);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
-        Surface::Probe& probe = *probes.local();
+        Surface::Probe& probe = probes.local();
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
             const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
                        &c = points[triangles[t][2]];

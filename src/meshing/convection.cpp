@@ -1,15 +1,14 @@
 #include "isotrack/meshing/convection.h"
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <cmath>
 #include <cstddef>
-#include <memory>
 #include <numeric>
 
 #include "delaunay/circumcentre.h"
 #include "isotrack/delaunay/predicates.h"
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
@@ -43,9 +42,9 @@ void update_labels(CellLabels& labels, const std::vector<int>& changed, const Te
                    const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
                    const Surface& surface) {
     labels.resize(cells.size(), kOutside);
-    tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
+    ThreadProbes probes(surface);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, changed.size(), 512), [&](const auto& range) {
-        Surface::Probe& probe = *probes.local();
+        Surface::Probe& probe = probes.local();
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             const int c = changed[i];
             const auto& v = cells.vertices[c];

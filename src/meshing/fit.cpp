@@ -1,6 +1,5 @@
 #include "isotrack/meshing/fit.h"
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Cholesky>
@@ -8,7 +7,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <memory>
+
+#include "meshing/sharpness.h"
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
@@ -66,12 +67,6 @@ Shares shares_of(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& pr
     return result;
 }
 
-/// Cotangent of the smallest angle.
-double sharpness(const Vec3& p, const Vec3& q, const Vec3& r) {
-    const Vec3 u = q - p, v = r - q, w = p - r;
-    return std::max({-u.dot(w), -v.dot(u), -w.dot(v)}) / u.cross(v).norm();
-}
-
 /// Whether a triangle turns over by these steps, or gets too sharp and sharper than it was.
 bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const Vec3& b_to,
             const Vec3& c_to) {
@@ -108,10 +103,10 @@ void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& all_triangles
     std::vector<Shares> shares(triangles.size());
     std::vector<char> bad(triangles.size());
     std::vector<Vec3> to = vertices;
-    tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
+    ThreadProbes probes(surface);
     for (int step = 0; step < steps; ++step) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
-            Surface::Probe& probe = *probes.local();
+            Surface::Probe& probe = probes.local();
             for (std::size_t t = range.begin(); t < range.end(); ++t)
                 shares[t] = shares_of(vertices[triangles[t][0]], vertices[triangles[t][1]],
                                       vertices[triangles[t][2]], probe);

@@ -1,15 +1,15 @@
 #include "isotrack/meshing/lattice_topology.h"
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <memory>
 #include <numeric>
 #include <tuple>
+
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
@@ -221,9 +221,9 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
         int wrong[27];
     };
     std::vector<Around> around(wrong.size());
-    tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
+    ThreadProbes probes(surface);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, wrong.size(), 64), [&](const auto& range) {
-        Surface::Probe& own_probe = *probes.local();
+        Surface::Probe& own_probe = probes.local();
         for (std::size_t w = range.begin(); w < range.end(); ++w)
             for (int x = -1; x <= 1; ++x)
                 for (int y = -1; y <= 1; ++y)

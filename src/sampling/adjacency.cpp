@@ -1,16 +1,17 @@
 #include "isotrack/sampling/adjacency.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <utility>
 
+#include "sampling/compact.h"
+
 namespace isotrack {
 
 Adjacency Adjacency::restricted(const std::vector<char>& keep) const {
-    std::vector<int> number(size(), -1);
-    int count = 0;
-    for (std::size_t i = 0; i < size(); ++i)
-        if (keep[i]) number[i] = count++;
+    const std::vector<int> number = numbers_after(keep);
     Adjacency result;
     for (std::size_t i = 0; i < size(); ++i) {
         if (!keep[i]) continue;
@@ -35,27 +36,28 @@ Adjacency Adjacency::restricted(const std::vector<char>& keep) const {
     return result;
 }
 
-namespace {
-
-/// From directed pairs, which may repeat.
 Adjacency from_pairs(const std::vector<std::pair<int, int>>& pairs, std::size_t count) {
+    // All lists with their repeats, then each sorted and made unique in its place.
     std::vector<int> first(count + 1, 0);
     for (const auto& p : pairs) ++first[p.first + 1];
     for (std::size_t i = 0; i < count; ++i) first[i + 1] += first[i];
     std::vector<int> second(pairs.size()), end(first.begin(), first.end() - 1);
     for (const auto& p : pairs) second[end[p.first]++] = p.second;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1024), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            const auto from = second.begin() + first[i];
+            std::sort(from, second.begin() + end[i]);
+            end[i] = static_cast<int>(std::unique(from, second.begin() + end[i]) - second.begin());
+        }
+    });
     Adjacency result;
     result.first.reserve(count + 1);
     for (std::size_t i = 0; i < count; ++i) {
-        std::sort(second.begin() + first[i], second.begin() + end[i]);
-        result.adjacent.insert(result.adjacent.end(), second.begin() + first[i],
-                               std::unique(second.begin() + first[i], second.begin() + end[i]));
+        result.adjacent.insert(result.adjacent.end(), second.begin() + first[i], second.begin() + end[i]);
         result.first.push_back(static_cast<int>(result.adjacent.size()));
     }
     return result;
 }
-
-}  // namespace
 
 Adjacency ring_of(const std::vector<std::array<int, 3>>& triangles, std::size_t count) {
     std::vector<std::pair<int, int>> pairs;

@@ -1,17 +1,8 @@
 #include "isotrack/sampling/particles.h"
 
+#include "sampling/compact.h"
+
 namespace isotrack {
-namespace {
-
-template <typename T>
-void compact(std::vector<T>& values, const std::vector<char>& keep) {
-    std::size_t to = 0;
-    for (std::size_t from = 0; from < values.size(); ++from)
-        if (keep[from]) values[to++] = values[from];
-    values.resize(to);
-}
-
-}  // namespace
 
 void Particles::add(const Vec3& p, const Vec3& n, double h, Id new_id, const Vec3& v) {
     position.push_back(p);

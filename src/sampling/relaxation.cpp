@@ -1,17 +1,15 @@
 #include "isotrack/sampling/relaxation.h"
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include <memory>
-
 #include "sampling/descent.h"
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 
 int relax(Particles& particles, const Adjacency& adjacency, const Surface& surface, int sweeps) {
     const auto groups = colour_groups(adjacency);
-    tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes([&] { return surface.probe(); });
+    ThreadProbes probes(surface);
     std::vector<double> lambda(particles.size(), 0.1);
     std::vector<char> moved(particles.size(), 1), active(particles.size(), 1);
     int done = 0;
@@ -27,7 +25,7 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
         }
         for (const auto& group : groups)
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, group.size(), 64), [&](const auto& range) {
-                Surface::Probe& probe = *probes.local();
+                Surface::Probe& probe = probes.local();
                 for (std::size_t g = range.begin(); g < range.end(); ++g) {
                     const int i = group[g];
                     moved[i] = active[i] && descend(particles, adjacency.of(i), i, lambda[i], probe).moved >

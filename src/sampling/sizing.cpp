@@ -40,7 +40,6 @@ void limit_gradation(Particles& particles, const Adjacency& adjacency) {
 /// From the distances to the neighbours next to a particle; the wanted spacing where it has too few.
 double actual_spacing(const Particles& particles, const Adjacency& adjacency, std::size_t i) {
     constexpr double kNextTo = 2.0;  // times the distance of the nearest
-    constexpr double kSlack = 1.0;  // of a relaxed population that may grow as well as shrink
     double least = std::numeric_limits<double>::infinity(), sum = 0.0;
     int count = 0;
     for (const bool nearest : {true, false})
@@ -54,7 +53,7 @@ double actual_spacing(const Particles& particles, const Adjacency& adjacency, st
                 ++count;
             }
         }
-    return count > 2 ? kSlack * sum / count : particles.spacing[i];
+    return count > 2 ? sum / count : particles.spacing[i];
 }
 
 /// The spacing that a quarter of the particles are below.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "meshing/sharpness.h"
+
 namespace isotrack {
 namespace {
 
@@ -30,19 +32,13 @@ Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
     return result;
 }
 
-/// Whether the smallest angle is below the one with this cotangent.
-bool is_sharp(const Vec3& p, const Vec3& q, const Vec3& r, double cotangent) {
-    const Vec3 u = q - p, v = r - q, w = p - r;
-    return std::max({-u.dot(w), -v.dot(u), -w.dot(v)}) > cotangent * u.cross(v).norm();
-}
-
 /// On smooth surface, not tiny, and with too small an angle, before the fit or after it.
 bool is_needle(const FrameMesh& mesh, const Particles& particles, std::size_t triangle,
                const Triangle& corner, double resolution) {
     const auto& [i, j, k] = mesh.carved.triangles[triangle];
     const auto& at = particles.position;
-    if (!is_sharp(at[corner[0]], at[corner[1]], at[corner[2]], kLargestCotangent) &&
-        !is_sharp(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k], kLargestFittedCotangent))
+    if (!(sharpness(at[corner[0]], at[corner[1]], at[corner[2]]) > kLargestCotangent) &&
+        !(sharpness(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]) > kLargestFittedCotangent))
         return false;
     double longest = 0.0;
     for (int e = 0; e < 3; ++e) {
@@ -55,42 +51,23 @@ bool is_needle(const FrameMesh& mesh, const Particles& particles, std::size_t tr
 
 }  // namespace
 
-std::vector<Inspector::Facet> Inspector::facets_of(const FrameMesh& mesh) {
-    std::vector<Facet> facets;
-    facets.reserve(mesh.carved.triangles.size());
-    for (std::size_t t = 0; t < mesh.carved.triangles.size(); ++t) {
-        const auto& [i, j, k] = mesh.carved.triangles[t];
-        const int key = corners_of(mesh.carved, t).whole
-                            ? 4 * mesh.carved.inside_cell[t] + mesh.carved.inside_facet[t]
-                            : -1;
-        facets.push_back({key, {mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]}});
-    }
-    return facets;
-}
-
-/// Calls `same` with the numbers of each facet that is in both, `changed` with each that is in one alone. The
-/// keys ascend, so they are met in one go.
-template <typename Both, typename One>
-void Inspector::compare(const std::vector<Facet>& now, const std::vector<Facet>& before, const Both& same,
-                        const One& changed) {
-    std::size_t old = 0;
-    for (std::size_t f = 0; f < now.size(); ++f) {
-        while (now[f].key >= 0 && old < before.size() && before[old].key < now[f].key) changed(before[old++]);
-        if (old < before.size() && now[f] == before[old])
-            same(f, old++);
-        else
-            changed(now[f]);
-    }
-    while (old < before.size()) changed(before[old++]);
+std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector<TriangleError>& errors,
+                                        std::size_t particles) {
+    std::vector<double> result(particles, -1.0);
+    for (std::size_t t = 0; t < errors.size(); ++t)
+        for (const int v : mesh.carved.triangles[t])
+            if (const int p = mesh.carved.particle[v]; p >= 0)
+                result[p] = std::max(result[p], errors[t].largest);
+    return result;
 }
 
 void Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
     constexpr int kNone = -1;
-    std::vector<Facet> facets = facets_of(mesh);
+    std::vector<Facet> facets = facets_of(mesh.carved, mesh.vertices);
     std::vector<int> known(facets.size(), kNone);
     compare(
         facets, facets_, [&](std::size_t f, std::size_t old) { known[f] = static_cast<int>(old); },
-        [](const Facet&) {});
+        [](std::size_t) {}, [](std::size_t) {});
     std::vector<Triangle> fresh;
     for (std::size_t f = 0; f < facets.size(); ++f)
         if (known[f] == kNone) fresh.push_back(mesh.carved.triangles[f]);
@@ -135,15 +112,15 @@ void Inspector::inspect_crossings(const FrameMesh& mesh, Inspection& inspection)
     if (distances_.empty()) {
         distances_.assign(crossings_.crossings().size(), kUnknownDistance);
     } else {
+        const auto forget = [&](const Facet& facet) {
+            const auto& [a, b, c] = facet.corner;
+            const Vec3 reach = Vec3::Constant(cutoff);
+            crossings_.for_each_in(Box(a.cwiseMin(b).cwiseMin(c) - reach, a.cwiseMax(b).cwiseMax(c) + reach),
+                                   [&](std::size_t i) { distances_[i] = kUnknownDistance; });
+        };
         compare(
-            facets_, reached_, [](std::size_t, std::size_t) {},
-            [&](const Facet& facet) {
-                const auto& [a, b, c] = facet.corner;
-                const Vec3 reach = Vec3::Constant(cutoff);
-                crossings_.for_each_in(
-                    Box(a.cwiseMin(b).cwiseMin(c) - reach, a.cwiseMax(b).cwiseMax(c) + reach),
-                    [&](std::size_t i) { distances_[i] = kUnknownDistance; });
-            });
+            facets_, reached_, [](std::size_t, std::size_t) {}, [&](std::size_t f) { forget(facets_[f]); },
+            [&](std::size_t f) { forget(reached_[f]); });
     }
     crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff, distances_);
     reached_ = facets_;

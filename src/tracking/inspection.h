@@ -1,7 +1,6 @@
 // One frame's mesh held against its surface, and what would mend it.
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "isotrack/meshing/certify.h"
@@ -11,6 +10,7 @@
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/sizing.h"
 #include "isotrack/tracking/tracker.h"
+#include "tracking/facets.h"
 
 namespace isotrack {
 
@@ -29,6 +29,10 @@ struct Inspection {
     std::vector<Vec3> doubtful;  ///< Crossings near its faults.
 };
 
+/// The largest of `errors` (one per triangle) around each of so many particles; negative without a triangle.
+std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector<TriangleError>& errors,
+                                        std::size_t particles);
+
 /// Inspects the meshes of one frame, each a little different from the one before: what lies away from the
 /// triangles that changed is not measured again.
 class Inspector {
@@ -45,15 +49,6 @@ public:
     void inspect_topology(const FrameMesh& mesh, Inspection& inspection) const;
 
 private:
-    struct Facet {
-        int key;  // of the cell and its facet; ascending but for halves of split triangles, which have -1
-        std::array<Vec3, 3> corner;
-        bool operator==(const Facet& o) const { return key >= 0 && key == o.key && corner == o.corner; }
-    };
-    static std::vector<Facet> facets_of(const FrameMesh& mesh);
-    template <typename Both, typename One>
-    static void compare(const std::vector<Facet>& now, const std::vector<Facet>& before, const Both& same,
-                        const One& changed);
     void measure_errors(const FrameMesh& mesh, Inspection& result);
     void take(const std::vector<double>& distances, const std::vector<Surface::Crossing>& crossings,
               Inspection& result) const;

@@ -1,6 +1,5 @@
 #include "isotrack/tracking/tracker.h"
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -24,6 +23,8 @@
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
+#include "sampling/compact.h"
+#include "surface/thread_probes.h"
 #include "tracking/inspection.h"
 
 namespace isotrack {
@@ -90,18 +91,10 @@ struct Memory {
     SizingEvidence evidence;
 
     void retain(const std::vector<char>& keep) {
-        std::vector<int> number(keep.size(), -1);
-        int count = 0;
-        for (std::size_t i = 0; i < keep.size(); ++i) {
-            if (!keep[i]) continue;
-            number[i] = count;
-            evidence.error[count] = evidence.error[i];
-            evidence.thickness[count] = evidence.thickness[i];
-            ++count;
-        }
-        evidence.error.resize(count);
-        evidence.thickness.resize(count);
+        compact(evidence.error, keep);
+        compact(evidence.thickness, keep);
         ring = ring.restricted(keep);
+        const std::vector<int> number = numbers_after(keep);
         std::size_t kept = 0;
         for (const Triangle& t : triangles)
             if (keep[t[0]] && keep[t[1]] && keep[t[2]])
@@ -122,11 +115,10 @@ struct Memory {
     }
 };
 
-/// Where the particles' vertices were after the last fit, and a number for the triangles around each; 0: not
-/// to be relied on.
+/// Where the vertices of a mesh were fitted to.
 struct Fitted {
-    std::vector<Vec3> position;
-    std::vector<std::uint64_t> ring;
+    std::vector<Facet> facets;   // before the fit
+    std::vector<Vec3> position;  // per particle
 
     void take(const FrameMesh& mesh, std::size_t particles) {
         position.resize(particles);
@@ -134,20 +126,6 @@ struct Fitted {
             if (const int p = mesh.carved.particle[v]; p >= 0) position[p] = mesh.vertices[v];
     }
 };
-
-/// Sums over the triangles around each particle: equal for equal rings, whatever their order.
-std::vector<std::uint64_t> ring_signatures(const CarvedSurface& carved, std::size_t particles) {
-    std::vector<std::uint64_t> result(particles, 0);
-    for (const Triangle& t : carved.triangles) {
-        Triangle p = {carved.particle[t[0]], carved.particle[t[1]], carved.particle[t[2]]};
-        std::sort(p.begin(), p.end());
-        std::uint64_t h = 0x9e3779b97f4a7c15u;
-        for (const int v : p) h = (h ^ static_cast<std::uint64_t>(v + 1)) * 0xbf58476d1ce4e5b9u ^ (h >> 29);
-        for (const int v : p)
-            if (v >= 0) result[v] += h;
-    }
-    return result;
-}
 
 /// Files hold floats: what is certified must be what is written.
 void round_to_float(Particles& particles) {
@@ -236,10 +214,9 @@ struct Tracker::Impl {
         const std::size_t n = particles.size();
         std::vector<char> keep(n, 0);
         const std::vector<Vec3> expected = expected_positions(surface, motion);
-        tbb::enumerable_thread_specific<std::unique_ptr<Surface::Probe>> probes(
-            [&] { return surface.probe(); });
+        ThreadProbes probes(surface);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 128), [&](const auto& range) {
-            Surface::Probe& probe = *probes.local();
+            Surface::Probe& probe = probes.local();
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
                 const Vec3 old = particles.position[i];
                 for (const Vec3& start : {expected[i], old}) {
@@ -315,26 +292,34 @@ struct Tracker::Impl {
     void fit_vertices(FrameMesh& mesh, Fitted& fitted, const Surface& surface,
                       std::map<std::string, double>& seconds) {
         const StageTimer timer(seconds, "fit");
-        const std::vector<std::uint64_t> rings = ring_signatures(mesh.carved, particles.size());
-        std::vector<char> movable(mesh.vertices.size(), 1);
+        const auto& triangles = mesh.carved.triangles;
+        std::vector<Facet> facets = facets_of(mesh.carved, mesh.on_surface);
+        std::vector<char> movable(mesh.vertices.size(), 0);
+        compare(
+            facets, fitted.facets, [](std::size_t, std::size_t) {},
+            [&](std::size_t f) {
+                for (const int v : triangles[f]) movable[v] = 1;
+            },
+            [](std::size_t) {});
+        std::vector<int> copies(particles.size(), 0);  // of which only one place is known
+        for (const int p : mesh.carved.particle)
+            if (p >= 0) ++copies[p];
         for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
             const int p = mesh.carved.particle[v];
-            if (p < 0 || p >= static_cast<int>(fitted.ring.size()) || fitted.ring[p] != rings[p]) continue;
-            movable[v] = 0;
-            mesh.vertices[v] = fitted.position[p];
+            if (p < 0 || copies[p] > 1) movable[v] = 1;
+            if (!movable[v]) mesh.vertices[v] = fitted.position[p];
         }
         constexpr int kRings = 2;
         for (int ring = 0; ring < kRings; ++ring) {
             const std::vector<char> before = movable;
-            for (const Triangle& t : mesh.carved.triangles)
+            for (const Triangle& t : triangles)
                 if (before[t[0]] || before[t[1]] || before[t[2]])
                     for (const int v : t) movable[v] = 1;
         }
-        fit(mesh.vertices, mesh.carved.triangles, surface, kFitSteps, movable);
+        fit(mesh.vertices, triangles, surface, kFitSteps, movable);
         for (Vec3& v : mesh.vertices) v = v.cast<float>().cast<double>();
-        fitted.ring = rings;
+        fitted.facets = std::move(facets);
         fitted.take(mesh, particles.size());
-        for (const auto& pinch : mesh.carved.pinched) fitted.ring[pinch.particle] = 0;  // several vertices
     }
 
     /// Puts fitted vertices back where their triangles cross others, a ring further each time, until none
@@ -370,12 +355,9 @@ struct Tracker::Impl {
         constexpr int kSizingSteps = 3;  // barycentric lattice of the samples: with the centroid
         SizingEvidence evidence;
         evidence.thickness = thickness_of(particles, dt->cells());
-        evidence.error.assign(particles.size(), -1.0);
-        const auto errors = triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps);
-        for (std::size_t t = 0; t < errors.size(); ++t)
-            for (const int v : mesh.carved.triangles[t])
-                if (const int p = mesh.carved.particle[v]; p >= 0)
-                    evidence.error[p] = std::max(evidence.error[p], errors[t].largest);
+        evidence.error = errors_at_particles(
+            mesh, triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps),
+            particles.size());
         update_spacing(particles, adjacency, evidence, l);
     }
 
@@ -413,7 +395,6 @@ struct Tracker::Impl {
     std::size_t make_room(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings,
                           bool thorough, TrackedFrame& frame);
     void remember(const FrameMesh& mesh);
-    void remember_errors(const FrameMesh& mesh, const std::vector<TriangleError>& errors);
     void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     TrackedFrame advance(const Surface& surface, const Motion& motion);
@@ -461,7 +442,7 @@ std::size_t Tracker::Impl::make_room(const Surface& surface, const SizingLimits&
         const StageTimer timer(frame.seconds, "certify");
         Inspector inspector(surface, l, crossings);
         Inspection inspection = inspector.inspect(mesh);
-        remember_errors(mesh, inspection.errors);
+        memory.evidence.error = errors_at_particles(mesh, inspection.errors, particles.size());
         if (thorough) inspector.inspect_crossings(mesh, inspection);
         added = mend(mesh, inspection, surface, l);
     }
@@ -488,14 +469,6 @@ void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, Tracke
     particles.retain(keep);
     memory.retain(keep);
     frame.sweeps += relax(particles, memory.ring.squared(), surface, kFollowSweeps);
-}
-
-void Tracker::Impl::remember_errors(const FrameMesh& mesh, const std::vector<TriangleError>& errors) {
-    memory.evidence.error.assign(particles.size(), -1.0);
-    for (std::size_t t = 0; t < errors.size(); ++t)
-        for (const int v : mesh.carved.triangles[t])
-            if (const int p = mesh.carved.particle[v]; p >= 0)
-                memory.evidence.error[p] = std::max(memory.evidence.error[p], errors[t].largest);
 }
 
 void Tracker::Impl::remember(const FrameMesh& mesh) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace isotrack {
@@ -30,6 +31,9 @@ struct Adjacency {
     /// Neighbours and their neighbours.
     Adjacency squared() const;
 };
+
+/// Of `count` particles, from directed pairs, which may repeat.
+Adjacency from_pairs(const std::vector<std::pair<int, int>>& pairs, std::size_t count);
 
 /// Which of `count` particles share an edge of a triangle.
 Adjacency ring_of(const std::vector<std::array<int, 3>>& triangles, std::size_t count);

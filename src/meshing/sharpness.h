@@ -1,0 +1,16 @@
+// How sharp a triangle is, without trigonometry.
+#pragma once
+
+#include <algorithm>
+
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// Cotangent of the smallest angle: 1.73 at 30 degrees, infinite without area.
+inline double sharpness(const Vec3& p, const Vec3& q, const Vec3& r) {
+    const Vec3 u = q - p, v = r - q, w = p - r;
+    return std::max({-u.dot(w), -v.dot(u), -w.dot(v)}) / u.cross(v).norm();
+}
+
+}  // namespace isotrack
