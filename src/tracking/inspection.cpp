@@ -13,6 +13,7 @@ constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's 
 constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
 constexpr double kLostAt = 3.0;      // tolerances
 constexpr double kFaultReach = 1.5;  // resolutions
+constexpr double kDoubtfulSpacing = 0.4;                                        // resolutions
 constexpr double kLargestCotangent = 2.4751, kLargestFittedCotangent = 3.0777;  // of 22 and 18 degrees
 constexpr double kSmooth =
     0.7;  // cosine between the normals of a triangle's corners, for its angles to matter
@@ -103,7 +104,23 @@ Inspection Inspector::inspect(const FrameMesh& mesh) {
     const CrossingGrid grid(missed_, 2.0 * surface_.resolution());
     take(crossing_distances(mesh.vertices, mesh.carved.triangles, grid, kLostAt * limits_.tolerance),
          grid.crossings(), result);
+    // What is still missed with a particle on its place is finer than the particles around it.
+    std::vector<Vec3> still;
+    for (const auto& crossing : result.missed) still.push_back(crossing.point);
+    doubt(still, result);
     return result;
+}
+
+void Inspector::doubt(const std::vector<Vec3>& places, Inspection& inspection) const {
+    const Vec3 near = Vec3::Constant(kFaultReach * surface_.resolution());
+    std::vector<std::size_t> doubtful;
+    for (const Vec3& place : places)
+        crossings_.for_each_in(Box(place - near, place + near), [&](std::size_t c) {
+            if ((crossings_.crossings()[c].point - place).norm() <= near.x()) doubtful.push_back(c);
+        });
+    std::sort(doubtful.begin(), doubtful.end());
+    doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
+    for (const std::size_t c : doubtful) inspection.doubtful.push_back(crossings_.crossings()[c].point);
 }
 
 void Inspector::inspect_crossings(const FrameMesh& mesh, Inspection& inspection) {
@@ -131,15 +148,7 @@ void Inspector::inspect_crossings(const FrameMesh& mesh, Inspection& inspection)
 void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) const {
     inspection.topology =
         lattice_topology(mesh.vertices, mesh.carved.triangles, surface_, crossings_.crossings());
-    const Vec3 near = Vec3::Constant(kFaultReach * surface_.resolution());
-    std::vector<std::size_t> doubtful;
-    for (const Vec3& fault : inspection.topology.faults)
-        crossings_.for_each_in(Box(fault - near, fault + near), [&](std::size_t c) {
-            if ((crossings_.crossings()[c].point - fault).norm() <= near.x()) doubtful.push_back(c);
-        });
-    std::sort(doubtful.begin(), doubtful.end());
-    doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
-    for (const std::size_t c : doubtful) inspection.doubtful.push_back(crossings_.crossings()[c].point);
+    doubt(inspection.topology.faults, inspection);
 }
 
 std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspection, const Tetrahedra& cells,
@@ -165,7 +174,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
         }
     }
     for (const auto& c : inspection.missed) result.push_back({c.point, 2.0 * surface.resolution()});
-    for (const Vec3& p : inspection.doubtful) result.push_back({p, surface.resolution()});
+    for (const Vec3& p : inspection.doubtful) result.push_back({p, kDoubtfulSpacing * surface.resolution()});
     for (const auto& e : carved.complex_edges)
         result.push_back({0.5 * (particles.position[e.from] + particles.position[e.to]),
                           0.7 * std::min(particles.spacing[e.from], particles.spacing[e.to])});

@@ -41,9 +41,8 @@ constexpr double kMostSeeded = 0.05;  // of the particles; with more the next fr
 constexpr int kCertifyRounds = 24;
 constexpr int kFitSteps = 6;
 constexpr double kFitWideExponent = 0.5;
-constexpr double kAngleFloor = 2.0;  // resolutions: sharp edges are as round as the grid makes them
-constexpr double kLeastSpacing =
-    0.02;  // resolutions: for shreds of a single voxel, where nothing coarser closes
+constexpr double kAngleFloor = 2.0;     // resolutions: sharp edges are as round as the grid makes them
+constexpr double kLeastSpacing = 5e-4;  // resolutions: a single node inside may leave no more than that
 
 /// Adds the time from its construction to its destruction to a stage.
 class StageTimer {
