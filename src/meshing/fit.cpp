@@ -14,10 +14,12 @@
 namespace isotrack {
 namespace {
 
-// The closed Newton-Cotes rule of degree 3 over a triangle: exact for the parabola that a curved surface
-// makes under a facet.
+// The points of the closed Newton-Cotes rule of degree 3 over a triangle, whose weights 54, 9 and 4 are exact
+// for the parabola that a curved surface makes under a facet. Corners and edges count more here, where a
+// fitted mesh is farthest from its surface: that lowers the largest error. Much more would cost the right
+// volume.
 constexpr int kLattice = 3;
-constexpr double kWeight[3] = {54.0, 9.0, 4.0};  // in the middle, on an edge, in a corner
+constexpr double kWeight[3] = {54.0, 12.0, 7.0};  // in the middle, on an edge, in a corner
 
 constexpr double kRelaxation = 1.5;   // the shares of the neighbours make each step too short
 constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
