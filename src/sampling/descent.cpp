@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sampling/metric.h"
+
 namespace isotrack {
 namespace {
 
@@ -11,41 +13,45 @@ constexpr int kMostNeighbours = 64;
 
 struct Neighbour {
     Vec3 position;
-    double scale2;  // (k_i^2 + k_j^2) / 2
+    Metric metric;  // its own
+
+    double square(const Metric& other, const Vec3& r) const {
+        return 0.5 * (other.square(r) + metric.square(r));
+    }
 };
 
 /// The neighbours of particle i within 2 sigma, and sigma^2, in the metric.
 struct Surroundings {
     Neighbour list[kMostNeighbours];
     int count = 0;
+    Metric metric;
     double sigma2 = 0.0;
     double nearest = 0.0;  // world units
 
-    Surroundings(const Particles& particles, Adjacency::Range neighbours, int i) {
+    Surroundings(const Particles& particles, Adjacency::Range neighbours, int i)
+        : metric(metric_of(particles, i)) {
         const Vec3& p = particles.position[i];
         const Vec3& n = particles.normal[i];
-        const double k2 = 1.0 / (particles.spacing[i] * particles.spacing[i]);
         double least = 1e300, least_world = 1e300;
         for (const int j : neighbours) {
             if (!(n.dot(particles.normal[j]) > 0.0) || count == kMostNeighbours) continue;
-            const double scale2 = 0.5 * (k2 + 1.0 / (particles.spacing[j] * particles.spacing[j]));
-            const double r2 = (particles.position[j] - p).squaredNorm();
-            least = std::min(least, scale2 * r2);
-            least_world = std::min(least_world, r2);
-            list[count++] = {particles.position[j], scale2};
+            const Vec3 r = particles.position[j] - p;
+            list[count] = {particles.position[j], metric_of(particles, j)};
+            least = std::min(least, list[count].square(metric, r));
+            least_world = std::min(least_world, r.squaredNorm());
+            ++count;
         }
         sigma2 = 0.5 * least;
         nearest = std::sqrt(least_world);
         int kept = 0;
         for (int a = 0; a < count; ++a)
-            if (list[a].scale2 * (list[a].position - p).squaredNorm() < 4.0 * sigma2) list[kept++] = list[a];
+            if (list[a].square(metric, list[a].position - p) < 4.0 * sigma2) list[kept++] = list[a];
         count = kept;
     }
 
     double energy(const Vec3& p) const {
         double e = 0.0;
-        for (int a = 0; a < count; ++a)
-            e += std::exp(-list[a].scale2 * (list[a].position - p).squaredNorm() / sigma2);
+        for (int a = 0; a < count; ++a) e += std::exp(-list[a].square(metric, list[a].position - p) / sigma2);
         return e;
     }
 };
@@ -74,13 +80,13 @@ DescentStep descend(Particles& particles, Adjacency::Range neighbours, int i, do
     // it points away from where the energy falls, towards the neighbours).
     double g1 = 0.0, g2 = 0.0, h11 = 0.0, h12 = 0.0, h22 = 0.0;
     for (int j = 0; j < near.count; ++j) {
-        const Vec3 r = near.list[j].position - p;
-        const double s1 = r.dot(a), s2 = r.dot(b), length2 = s1 * s1 + s2 * s2;
-        const double m = near.list[j].scale2 / near.sigma2, e = std::exp(-m * length2);
-        g1 += 2.0 * m * e * s1;
-        g2 += 2.0 * m * e * s2;
-        if (length2 > 0.0) {
-            const double c = e * m * (4.0 * m * length2 - 2.0) / length2;
+        const Vec3 r = near.list[j].position - p, s = r - r.dot(n) * n;
+        const Vec3 ms = (near.metric.apply(s) + near.list[j].metric.apply(s)) / (2.0 * near.sigma2);
+        const double s1 = ms.dot(a), s2 = ms.dot(b), q = ms.dot(s), e = std::exp(-q);
+        g1 += 2.0 * e * s1;
+        g2 += 2.0 * e * s2;
+        if (q > 0.0) {
+            const double c = e * (4.0 * q - 2.0) / q;
             h11 += c * s1 * s1;
             h12 += c * s1 * s2;
             h22 += c * s2 * s2;

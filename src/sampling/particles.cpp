@@ -8,6 +8,7 @@ void Particles::add(const Vec3& p, const Vec3& n, double h, Id new_id, const Vec
     position.push_back(p);
     normal.push_back(n);
     spacing.push_back(h);
+    stretch.push_back(Vec3::Zero());
     id.push_back(new_id);
     velocity.push_back(v);
 }
@@ -16,6 +17,7 @@ void Particles::retain(const std::vector<char>& keep) {
     compact(position, keep);
     compact(normal, keep);
     compact(spacing, keep);
+    compact(stretch, keep);
     compact(id, keep);
     compact(velocity, keep);
 }

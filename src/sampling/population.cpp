@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "isotrack/sampling/particle_grid.h"
+#include "sampling/metric.h"
 
 namespace isotrack {
 
@@ -18,13 +19,13 @@ std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacen
                             const PopulationBand& band) {
     std::vector<std::pair<double, int>> crowded;
     for (std::size_t i = 0; i < particles.size(); ++i) {
-        double q = 1e300;
+        double q = 1e300;  // squared
         for (const int j : adjacency.of(i)) {
             if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
-            const double h = 0.5 * (particles.spacing[i] + particles.spacing[j]);
-            q = std::min(q, (particles.position[j] - particles.position[i]).norm() / h);
+            const Vec3 r = particles.position[j] - particles.position[i];
+            q = std::min(q, 0.5 * (metric_of(particles, i).square(r) + metric_of(particles, j).square(r)));
         }
-        if (q < band.crowded) crowded.emplace_back(q, static_cast<int>(i));
+        if (q < band.crowded * band.crowded) crowded.emplace_back(q, static_cast<int>(i));
     }
     std::sort(crowded.begin(), crowded.end());
     std::vector<char> keep(particles.size(), 1);
@@ -36,19 +37,53 @@ std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacen
     return keep;
 }
 
+namespace {
+
+/// A triangle in the mean metric of its corners.
+struct MetricTriangle {
+    const Particles& particles;
+    const Triangle& corner;
+    double side2[3];  // squared, opposite each corner
+    double area2_16;  // 16 times the squared area
+
+    MetricTriangle(const Particles& of, const Triangle& triangle) : particles(of), corner(triangle) {
+        for (int k = 0; k < 3; ++k)
+            side2[k] =
+                square(particles.position[corner[(k + 2) % 3]] - particles.position[corner[(k + 1) % 3]]);
+        area2_16 = 2.0 * (side2[0] * side2[1] + side2[1] * side2[2] + side2[2] * side2[0]) -
+                   (side2[0] * side2[0] + side2[1] * side2[1] + side2[2] * side2[2]);
+    }
+    double square(const Vec3& r) const {
+        double sum = 0.0;
+        for (const int i : corner) sum += metric_of(particles, static_cast<std::size_t>(i)).square(r);
+        return sum / 3.0;
+    }
+    double circumradius() const { return std::sqrt(side2[0] * side2[1] * side2[2] / area2_16); }
+    Vec3 circumcentre() const {
+        Vec3 centre = Vec3::Zero();
+        for (int k = 0; k < 3; ++k)
+            centre += side2[k] * (side2[(k + 1) % 3] + side2[(k + 2) % 3] - side2[k]) / area2_16 *
+                      particles.position[corner[k]];
+        return centre;
+    }
+    Vec3 middle() const {
+        return (particles.position[corner[0]] + particles.position[corner[1]] +
+                particles.position[corner[2]]) /
+               3.0;
+    }
+};
+
+}  // namespace
+
 std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triangle>& triangles,
                                   const Adjacency& adjacency, const Surface& surface, Id& next_id,
                                   const PopulationBand& band) {
     std::vector<std::pair<double, int>> large;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
-        const auto& [a, b, c] = triangles[t];
-        const Vec3 u = particles.position[b] - particles.position[a],
-                   v = particles.position[c] - particles.position[a];
-        const double area2 = u.cross(v).norm();
-        if (!(area2 > 0.0)) continue;
-        const double radius = u.norm() * v.norm() * (u - v).norm() / (2.0 * area2);
-        const double h = (particles.spacing[a] + particles.spacing[b] + particles.spacing[c]) / 3.0;
-        if (radius > band.sparse * h) large.emplace_back(-radius / h, static_cast<int>(t));
+        const MetricTriangle triangle(particles, triangles[t]);
+        if (!(triangle.area2_16 > 0.0)) continue;
+        const double radius = triangle.circumradius();
+        if (radius > band.sparse) large.emplace_back(-radius, static_cast<int>(t));
     }
     std::sort(large.begin(), large.end());
     std::vector<char> touched(particles.size(), 0);
@@ -57,19 +92,17 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
     for (const auto& [ratio, t] : large) {
         const auto& [a, b, c] = triangles[t];
         if (touched[a] || touched[b] || touched[c]) continue;
-        const Vec3 pa = particles.position[a], u = particles.position[b] - pa, v = particles.position[c] - pa,
-                   w = u.cross(v);
-        const double h = (particles.spacing[a] + particles.spacing[b] + particles.spacing[c]) / 3.0;
+        const MetricTriangle triangle(particles, triangles[t]);
         // An obtuse triangle has its circumcentre far outside: stay within one spacing.
-        Vec3 centre = (u.squaredNorm() * v.cross(w) + v.squaredNorm() * w.cross(u)) / (2.0 * w.squaredNorm());
-        const Vec3 middle = (u + v) / 3.0;
-        if ((centre - middle).norm() > h) centre = middle + h * (centre - middle).normalized();
-        const auto p = probe->project(pa + centre);
+        const Vec3 middle = triangle.middle(), to_centre = triangle.circumcentre() - middle;
+        const double off = std::sqrt(triangle.square(to_centre));
+        const auto p = probe->project(middle + to_centre / std::max(1.0, off));
         if (!p) continue;
         const Vec3 n = probe->normal(*p);
         if (!(n.dot(particles.normal[a] + particles.normal[b] + particles.normal[c]) > 0.0)) continue;
         const auto is_near = [&](int j) {
-            return n.dot(particles.normal[j]) > 0.0 && (particles.position[j] - *p).norm() < kEmpty * h;
+            return n.dot(particles.normal[j]) > 0.0 &&
+                   triangle.square(particles.position[j] - *p) < kEmpty * kEmpty;
         };
         if (std::any_of(triangles[t].begin(), triangles[t].end(), [&](int corner) {
                 const Adjacency::Range near = adjacency.of(corner);
@@ -77,7 +110,9 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
             }))
             continue;
         const Vec3 velocity = (particles.velocity[a] + particles.velocity[b] + particles.velocity[c]) / 3.0;
+        const double h = (particles.spacing[a] + particles.spacing[b] + particles.spacing[c]) / 3.0;
         particles.add(*p, n, h, next_id++, velocity);
+        particles.stretch.back() = particles.stretch[a];
         touched[a] = touched[b] = touched[c] = 1;
         parents.push_back(triangles[t]);
     }

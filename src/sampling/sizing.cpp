@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,6 +14,8 @@ constexpr double kShare = 0.72;      // of the tolerance, aimed at by the larges
 constexpr double kGradation = 0.25;  // growth of the spacing per distance
 constexpr int kGradationPasses = 3;
 constexpr double kThicknessShare = 0.9;
+constexpr double kMostStretch = 1.4;      // more saves nothing and makes sharper angles
+constexpr double kCurvatureNoise = 0.15;  // of the curvature that the spacing is meant for
 
 template <typename Body>
 void for_each_particle(std::size_t n, const Body& body) {
@@ -54,6 +57,68 @@ double actual_spacing(const Particles& particles, const Adjacency& adjacency, st
             }
         }
     return count > 2 ? sum / count : particles.spacing[i];
+}
+
+/// A symmetric map of the plane spanned by two unit vectors a and b: eigenvalues mean + off and mean - off.
+struct PlaneMap {
+    double mean, off;
+    Vec3 major, minor;  // unit eigenvectors
+
+    PlaneMap(double aa, double ab, double bb, const Vec3& a, const Vec3& b)
+        : mean(0.5 * (aa + bb)), off(std::hypot(0.5 * (aa - bb), ab)) {
+        const double angle = 0.5 * std::atan2(2.0 * ab, aa - bb);
+        major = std::cos(angle) * a + std::sin(angle) * b;
+        minor = std::cos(angle) * b - std::sin(angle) * a;
+    }
+};
+
+/// The curvature around particle i, from steps in its tangent plane to changes of the normal, by least
+/// squares over the neighbours; the principal curvatures without their signs.
+Mat3 absolute_curvature(const Particles& particles, const Adjacency& adjacency, std::size_t i) {
+    const Vec3 &p = particles.position[i], &n = particles.normal[i];
+    const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
+    Mat3 squares = Mat3::Zero();
+    Vec3 products = Vec3::Zero();
+    for (const int j : adjacency.of(i)) {
+        if (!(n.dot(particles.normal[j]) > 0.0)) continue;
+        const Vec3 r = particles.position[j] - p, turn = particles.normal[j] - n;
+        const double x = r.dot(a), y = r.dot(b), length2 = r.squaredNorm();
+        if (!(length2 > 0.0)) continue;
+        const Vec3 along_a(x, y, 0.0), along_b(0.0, x, y);  // times (aa, ab, bb)
+        squares += (along_a * along_a.transpose() + along_b * along_b.transpose()) / length2;
+        products += (turn.dot(a) * along_a + turn.dot(b) * along_b) / length2;
+    }
+    const Vec3 fitted = squares.ldlt().solve(products);
+    if (!fitted.allFinite()) return Mat3::Zero();
+    const PlaneMap map(fitted[0], fitted[1], fitted[2], a, b);
+    return std::abs(map.mean + map.off) * map.major * map.major.transpose() +
+           std::abs(map.mean - map.off) * map.minor * map.minor.transpose();
+}
+
+/// From the curvature around a particle, of which so much is noise.
+Vec3 stretch_from(const Mat3& curvature, const Vec3& n, double noise) {
+    const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
+    const PlaneMap map(a.dot(curvature * a), a.dot(curvature * b), b.dot(curvature * b), a, b);
+    const double s = std::sqrt((map.mean + map.off + noise) / (map.mean - map.off + noise));
+    return std::sqrt(std::clamp(s, 1.0, kMostStretch) - 1.0) * map.minor;
+}
+
+void update_stretch(Particles& particles, const Adjacency& adjacency, double tolerance) {
+    std::vector<Mat3> curvature(particles.size());
+    for_each_particle(particles.size(),
+                      [&](std::size_t i) { curvature[i] = absolute_curvature(particles, adjacency, i); });
+    for_each_particle(particles.size(), [&](std::size_t i) {
+        Mat3 sum = curvature[i];
+        int count = 1;
+        for (const int j : adjacency.of(i)) {
+            if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
+            sum += curvature[j];
+            ++count;
+        }
+        // With this curvature a triangle of the wanted spacing has the tolerance for its error.
+        const double bent = 6.0 * tolerance / (particles.spacing[i] * particles.spacing[i]);
+        particles.stretch[i] = stretch_from(sum / count, particles.normal[i], kCurvatureNoise * bent);
+    });
 }
 
 /// The spacing that a quarter of the particles are below.
@@ -128,12 +193,15 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
         // 1 - cos t ~ t^2 / 2, so the curvature is sqrt(2) k_nd.
         const double kappa = std::sqrt(2.0) * normal_deviation(particles, adjacency, i);
         if (kappa > 0.0)
-            h = std::min(h, std::max({limits.angle / kappa, limits.angle_floor, 0.7 * particles.spacing[i]}));
+            h = std::min(h,
+                         std::max({limits.angle * std::sqrt(1.0 + particles.stretch[i].squaredNorm()) / kappa,
+                                   limits.angle_floor, 0.7 * particles.spacing[i]}));
         h = std::min(h, std::max(kThicknessShare * evidence.thickness[i], 0.7 * particles.spacing[i]));
         next[i] = bounded(h, limits);
     });
     particles.spacing.swap(next);
     limit_gradation(particles, adjacency);
+    update_stretch(particles, adjacency, limits.tolerance);
 }
 
 }  // namespace isotrack

@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -238,6 +239,50 @@ TEST(Relax, FollowsTheSpacingThatIsAskedFor) {
     EXPECT_GT(left / lefts, 1.2 * right / rights);
 }
 
+/// Along the tube of a torus around the third axis.
+Vec3 along_tube(const Vec3& p) {
+    return Vec3(-p.y(), p.x(), 0.0).normalized();
+}
+
+/// How many times longer the edges to the six nearest are along the tube than across it, nearest when lengths
+/// along it count sqrt(s) times less and across it more.
+double elongation_on_torus(const Particles& particles, double s) {
+    double along = 0.0, across = 0.0;
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+        const Vec3 t = along_tube(particles.position[i]);
+        std::vector<std::array<double, 3>> near;  // distance, squares along and across
+        for (std::size_t j = 0; j < particles.size(); ++j) {
+            if (j == i) continue;
+            const Vec3 r = particles.position[j] - particles.position[i];
+            const double a = r.dot(t) * r.dot(t), b = r.squaredNorm() - a;
+            near.push_back({a / s + b * s, a, b});
+        }
+        std::nth_element(near.begin(), near.begin() + 5, near.end());
+        for (int k = 0; k < 6; ++k) {
+            along += near[k][1];
+            across += near[k][2];
+        }
+    }
+    return std::sqrt(along / across);
+}
+
+TEST(Relax, LeavesMoreRoomAlongTheStretch) {
+    const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.3, 0.05);
+    for (const double s : {1.0, 1.4}) {
+        Particles particles;
+        Id next_id = 0;
+        cover(particles, *torus, CrossingGrid(*torus), limits_of(0.12), 1, next_id);
+        for (int round = 0; round < 12; ++round) {
+            for (std::size_t i = 0; i < particles.size(); ++i)
+                particles.stretch[i] = std::sqrt(s - 1.0) * along_tube(particles.position[i]);
+            relax(particles, adjacency_of(particles), *torus, 3);
+        }
+        EXPECT_NEAR(elongation_on_torus(particles, s), s, 0.1);
+        // To look for the nearest along the tube does not make them so.
+        if (s == 1.0) EXPECT_LT(elongation_on_torus(particles, 1.4), 1.25);
+    }
+}
+
 TEST(Relax, GivesTheSameBitsAtAnyThreadCount) {
     const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.3, 0.05);
     const auto run = [&](std::size_t threads) {
@@ -337,6 +382,38 @@ TEST(UpdateSpacing, KeepsBelowTheAngleAndTheThickness) {
     evidence.thickness[7] = 0.08;
     for (int round = 0; round < 10; ++round) update_spacing(particles, adjacency, evidence, limits);
     EXPECT_LE(particles.spacing[7], 0.08);
+}
+
+TEST(UpdateSpacing, StretchesAlongTheWayTheSurfaceBendsLess) {
+    SizingLimits limits = limits_of(0.12);
+    SizingEvidence evidence;
+    const auto updated = [&](Particles particles) {
+        evidence.error.assign(particles.size(), -1.0);
+        evidence.thickness.assign(particles.size(), std::numeric_limits<double>::infinity());
+        update_spacing(particles, adjacency_of(particles), evidence, limits);
+        return particles;
+    };
+    const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.3, 0.05);
+    Particles particles;
+    Id next_id = 0;
+    cover(particles, *torus, CrossingGrid(*torus), limits, 1, next_id);
+    for (int round = 0; round < 10; ++round) relax(particles, adjacency_of(particles), *torus, 3);
+    const Particles on_torus = updated(particles);
+    double sum = 0.0;
+    int count = 0;
+    for (std::size_t i = 0; i < on_torus.size(); ++i) {
+        const Vec3 &p = on_torus.position[i], &stretch = on_torus.stretch[i];
+        EXPECT_LE(stretch.squaredNorm(), 0.4 + 1e-9);
+        EXPECT_NEAR(stretch.dot(on_torus.normal[i]), 0.0, 1e-6);
+        if (std::hypot(p.x(), p.y()) < 1.0) continue;  // inside the hole both curvatures may be alike
+        // Curvatures 1 / 0.3, and at most 1 / 1.3 the other way.
+        EXPECT_GT(std::abs(stretch.normalized().dot(along_tube(p))), 0.9);
+        sum += stretch.squaredNorm();
+        ++count;
+    }
+    EXPECT_GT(sum / count, 0.35);
+    const Particles on_sphere = updated(settled_on_unit_sphere(400, 0.19));
+    for (const Vec3& stretch : on_sphere.stretch) EXPECT_LT(stretch.squaredNorm(), 0.1);
 }
 
 TEST(SpacingFromCurvature, GivesTheEdgeWhoseErrorIsTheTolerance) {

@@ -12,8 +12,11 @@ struct Particles {
     std::vector<Vec3> position;  ///< On the surface.
     std::vector<Vec3> normal;    ///< Unit, outward (O2).
     std::vector<double>
-        spacing;         ///< Wanted distance h to the nearest neighbour; 1/h is the paper's k in world units.
-    std::vector<Id> id;  ///< Unique over the run, never reused.
+        spacing;  ///< Wanted distance h to the nearest neighbour; 1/h is the paper's k in world units.
+    std::vector<Vec3> stretch;   ///< Where the surface bends less one way than the other, along that way; s =
+                                 ///< 1 + |stretch|^2 is how many times longer triangles should be along it
+                                 ///< than across. Zero: all ways alike.
+    std::vector<Id> id;          ///< Unique over the run, never reused.
     std::vector<Vec3> velocity;  ///< Displacement since the last frame; that of their neighbours for the
                                  ///< newborn, zero without any.
 

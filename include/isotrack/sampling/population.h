@@ -9,9 +9,9 @@
 
 namespace isotrack {
 
-/// Thresholds relative to the spacing. In a hexagonal packing the nearest neighbour is at 1, the circumradius
-/// is 0.577. A death leaves an empty circle of the radius of the old distances, below `sparse`; a birth has
-/// its nearest neighbours at that radius, above `crowded`.
+/// Thresholds relative to the spacing, in the metric of the particles' stretch. In a hexagonal packing the
+/// nearest neighbour is at 1, the circumradius is 0.577. A death leaves an empty circle of the radius of the
+/// old distances, below `sparse`; a birth has its nearest neighbours at that radius, above `crowded`.
 struct PopulationBand {
     double crowded = 0.65;  ///< Delete below this distance to the nearest neighbour.
     double sparse = 0.85;   ///< Insert where a triangle's circumradius is above this.

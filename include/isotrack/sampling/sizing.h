@@ -41,7 +41,8 @@ double normal_deviation(const Particles& particles, const Adjacency& adjacency, 
 /// Feeds the measured error back: 1/h^2 becomes error / (share of the tolerance), at least 1/2 and at most 2,
 /// over the wanted spacing times the actual one, since the error is that of the actual and a population with
 /// a dead zone lags behind what is wanted; then the angle, the thickness and the limits bound it, and the
-/// gradation h_i <= h_j + 0.25 r_ij smooths it.
+/// gradation h_i <= h_j + 0.25 r_ij smooths it. The stretch becomes (kappa_1 / kappa_2)^(1/2), at most 1.4,
+/// from the curvature of the normals around the particle.
 void update_spacing(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence,
                     const SizingLimits& limits);
 

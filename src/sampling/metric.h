@@ -1,0 +1,34 @@
+// Lengths in units of the spacing, longer across a particle's stretch than along it.
+#pragma once
+
+#include <cmath>
+
+#include "isotrack/sampling/particles.h"
+
+namespace isotrack {
+
+/// The squared length r^T M r of an edge r as scale |r|^2 - (w . r)^2.
+struct Metric {
+    double scale;
+    Vec3 w;
+
+    double square(const Vec3& r) const {
+        const double along = w.dot(r);
+        return scale * r.squaredNorm() - along * along;
+    }
+    /// M r.
+    Vec3 apply(const Vec3& r) const { return scale * r - w.dot(r) * w; }
+};
+
+/// That of a particle with this spacing h and stretch u: with s = 1 + |u|^2, lengths along u count
+/// 1 / (sqrt(s) h), those across it sqrt(s) / h.
+inline Metric metric_of(double spacing, const Vec3& stretch) {
+    const double s = 1.0 + stretch.squaredNorm(), k = 1.0 / spacing;
+    return {s * k * k, k * std::sqrt(1.0 + 1.0 / s) * stretch};
+}
+
+inline Metric metric_of(const Particles& particles, std::size_t i) {
+    return metric_of(particles.spacing[i], particles.stretch[i]);
+}
+
+}  // namespace isotrack
