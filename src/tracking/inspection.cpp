@@ -62,7 +62,7 @@ std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector
     return result;
 }
 
-void Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
+std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
     constexpr int kNone = -1;
     std::vector<Facet> facets = facets_of(mesh.carved, mesh.vertices);
     std::vector<int> known(facets.size(), kNone);
@@ -74,9 +74,17 @@ void Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
         if (known[f] == kNone) fresh.push_back(mesh.carved.triangles[f]);
     const auto errors = triangle_errors(mesh.vertices, fresh, surface_, kSteps, kSuspect * limits_.tolerance);
     auto next = errors.begin();
-    for (const int old : known) result.errors.push_back(old == kNone ? *next++ : errors_[old]);
+    std::vector<Vec3> in_vain;
+    const auto probe = surface_.probe();
+    for (const int old : known) {
+        result.errors.push_back(old == kNone ? *next++ : errors_[old]);
+        const TriangleError& error = result.errors.back();
+        if (error.largest > kCertified * limits_.tolerance && (old != kNone || !probe->project(error.where)))
+            in_vain.push_back(error.where);
+    }
     facets_ = std::move(facets);
     errors_ = result.errors;
+    return in_vain;
 }
 
 void Inspector::take(const std::vector<double>& distances, const std::vector<Surface::Crossing>& crossings,
@@ -100,14 +108,13 @@ void Inspector::take(const std::vector<double>& distances, const std::vector<Sur
 
 Inspection Inspector::inspect(const FrameMesh& mesh) {
     Inspection result;
-    measure_errors(mesh, result);
+    std::vector<Vec3> in_vain = measure_errors(mesh, result);
     const CrossingGrid grid(missed_, 2.0 * surface_.resolution());
     take(crossing_distances(mesh.vertices, mesh.carved.triangles, grid, kLostAt * limits_.tolerance),
          grid.crossings(), result);
     // What is still missed with a particle on its place is finer than the particles around it.
-    std::vector<Vec3> still;
-    for (const auto& crossing : result.missed) still.push_back(crossing.point);
-    doubt(still, result);
+    for (const auto& crossing : result.missed) in_vain.push_back(crossing.point);
+    doubt(in_vain, result);
     return result;
 }
 

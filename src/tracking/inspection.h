@@ -26,7 +26,7 @@ struct Inspection {
     double farthest_crossing = 0.0, crossings_mean_square = 0.0;  ///< Of those that were found.
     std::size_t lost_crossings = 0;                               ///< Those that were not.
     LatticeTopology topology;
-    std::vector<Vec3> doubtful;  ///< Crossings near its faults and near those that stay missed.
+    std::vector<Vec3> doubtful;  ///< Crossings near its faults and near what was mended in vain.
 };
 
 /// The largest of `errors` (one per triangle) around each of so many particles; negative without a triangle.
@@ -51,7 +51,8 @@ public:
 private:
     /// Adds the crossings near some places to the doubtful ones.
     void doubt(const std::vector<Vec3>& places, Inspection& inspection) const;
-    void measure_errors(const FrameMesh& mesh, Inspection& result);
+    /// Returns where errors that are too large cannot be mended, or were not when they were seen last.
+    std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
     void take(const std::vector<double>& distances, const std::vector<Surface::Crossing>& crossings,
               Inspection& result) const;
 
