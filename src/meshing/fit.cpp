@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "meshing/corners.h"
 #include "meshing/sharpness.h"
 #include "surface/thread_probes.h"
 
@@ -26,21 +27,6 @@ constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
 constexpr double kDamping = 0.02;     // of the quadric's trace: how freely a vertex slides along the surface
 constexpr double kLargestCotangent = 1.7320508075688772;  // of 30 degrees
 constexpr int kHalvings = 2;  // of the steps around a spoilt triangle, before they are taken back
-
-/// The triangles around each vertex: those of v are entries first[v] to first[v + 1] - 1, as 3 * triangle +
-/// corner.
-struct Corners {
-    std::vector<int> first, corner;
-    Corners(std::size_t vertices, const std::vector<Triangle>& triangles)
-        : first(vertices + 1, 0), corner(3 * triangles.size()) {
-        for (const Triangle& t : triangles)
-            for (const int v : t) ++first[v + 1];
-        for (std::size_t v = 0; v < vertices; ++v) first[v + 1] += first[v];
-        std::vector<int> end(first.begin(), first.end() - 1);
-        for (std::size_t t = 0; t < triangles.size(); ++t)
-            for (int k = 0; k < 3; ++k) corner[end[triangles[t][k]]++] = static_cast<int>(3 * t) + k;
-    }
-};
 
 /// A triangle's share in the normal equations of its corners.
 struct Shares {

@@ -7,7 +7,8 @@ std::vector<Facet> facets_of(const CarvedSurface& carved, const std::vector<Vec3
     facets.reserve(carved.triangles.size());
     for (std::size_t t = 0; t < carved.triangles.size(); ++t) {
         const auto& [i, j, k] = carved.triangles[t];
-        const bool whole = carved.particle[i] >= 0 && carved.particle[j] >= 0 && carved.particle[k] >= 0;
+        const bool whole = carved.inside_cell[t] >= 0 && carved.particle[i] >= 0 && carved.particle[j] >= 0 &&
+                           carved.particle[k] >= 0;
         facets.push_back({whole ? 4 * carved.inside_cell[t] + carved.inside_facet[t] : -1,
                           {vertices[i], vertices[j], vertices[k]}});
     }

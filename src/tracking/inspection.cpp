@@ -9,11 +9,11 @@ namespace isotrack {
 namespace {
 
 constexpr int kSteps = 6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
-constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's largest error is searched for
-constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
-constexpr double kLostAt = 3.0;      // tolerances
-constexpr double kFaultReach = 1.5;  // resolutions
-constexpr double kDoubtfulSpacing = 0.4;                                        // resolutions
+constexpr double kSuspect = 0.6;      // of the tolerance: above it a triangle's largest error is searched for
+constexpr double kCertified = 0.98;   // of the tolerance: so that samples at other places find it kept, too
+constexpr double kLostAt = 3.0;       // tolerances
+constexpr double kFaultReach = 1.5;   // resolutions
+constexpr double kVainSpacing = 0.4;  // resolutions
 constexpr double kLargestCotangent = 2.4751, kLargestFittedCotangent = 3.0777;  // of 22 and 18 degrees
 constexpr double kSmooth =
     0.7;  // cosine between the normals of a triangle's corners, for its angles to matter
@@ -114,11 +114,11 @@ Inspection Inspector::inspect(const FrameMesh& mesh) {
          grid.crossings(), result);
     // What is still missed with a particle on its place is finer than the particles around it.
     for (const auto& crossing : result.missed) in_vain.push_back(crossing.point);
-    doubt(in_vain, result);
+    doubt(in_vain, kVainSpacing, result);
     return result;
 }
 
-void Inspector::doubt(const std::vector<Vec3>& places, Inspection& inspection) const {
+void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const {
     const Vec3 near = Vec3::Constant(kFaultReach * surface_.resolution());
     std::vector<std::size_t> doubtful;
     for (const Vec3& place : places)
@@ -127,7 +127,8 @@ void Inspector::doubt(const std::vector<Vec3>& places, Inspection& inspection) c
         });
     std::sort(doubtful.begin(), doubtful.end());
     doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
-    for (const std::size_t c : doubtful) inspection.doubtful.push_back(crossings_.crossings()[c].point);
+    for (const std::size_t c : doubtful)
+        inspection.doubtful.push_back({crossings_.crossings()[c].point, spacing * surface_.resolution()});
 }
 
 void Inspector::inspect_crossings(const FrameMesh& mesh, Inspection& inspection) {
@@ -152,10 +153,11 @@ void Inspector::inspect_crossings(const FrameMesh& mesh, Inspection& inspection)
     missed_ = inspection.missed;
 }
 
-void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) const {
+void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {
     inspection.topology =
         lattice_topology(mesh.vertices, mesh.carved.triangles, surface_, crossings_.crossings());
-    doubt(inspection.topology.faults, inspection);
+    doubt(inspection.topology.faults, fault_spacing_, inspection);
+    fault_spacing_ = kVainSpacing;
 }
 
 std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspection, const Tetrahedra& cells,
@@ -181,7 +183,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
         }
     }
     for (const auto& c : inspection.missed) result.push_back({c.point, 2.0 * surface.resolution()});
-    for (const Vec3& p : inspection.doubtful) result.push_back({p, kDoubtfulSpacing * surface.resolution()});
+    result.insert(result.end(), inspection.doubtful.begin(), inspection.doubtful.end());
     for (const auto& e : carved.complex_edges)
         result.push_back({0.5 * (particles.position[e.from] + particles.position[e.to]),
                           0.7 * std::min(particles.spacing[e.from], particles.spacing[e.to])});

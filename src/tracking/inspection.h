@@ -26,7 +26,7 @@ struct Inspection {
     double farthest_crossing = 0.0, crossings_mean_square = 0.0;  ///< Of those that were found.
     std::size_t lost_crossings = 0;                               ///< Those that were not.
     LatticeTopology topology;
-    std::vector<Vec3> doubtful;  ///< Crossings near its faults and near what was mended in vain.
+    std::vector<Shortage> doubtful;  ///< Crossings near its faults and near what was mended in vain.
 };
 
 /// The largest of `errors` (one per triangle) around each of so many particles; negative without a triangle.
@@ -46,11 +46,11 @@ public:
     /// Surface to mesh, for the mesh just inspected.
     void inspect_crossings(const FrameMesh& mesh, Inspection& inspection);
     /// And its topology.
-    void inspect_topology(const FrameMesh& mesh, Inspection& inspection) const;
+    void inspect_topology(const FrameMesh& mesh, Inspection& inspection);
 
 private:
-    /// Adds the crossings near some places to the doubtful ones.
-    void doubt(const std::vector<Vec3>& places, Inspection& inspection) const;
+    /// Adds the crossings near some places to the doubtful ones; `spacing` in resolutions.
+    void doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const;
     /// Returns where errors that are too large cannot be mended, or were not when they were seen last.
     std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
     void take(const std::vector<double>& distances, const std::vector<Surface::Crossing>& crossings,
@@ -64,6 +64,7 @@ private:
     std::vector<Facet> reached_;         // of the last inspection of the crossings
     std::vector<double> distances_;      // to them, per crossing
     std::vector<Surface::Crossing> missed_;
+    double fault_spacing_ = 0.8;  // resolutions; less from the second look on
 };
 
 /// Where particles are missing: at the dual crossings of triangles with too large an error or, where the

@@ -13,6 +13,7 @@
 #include "isotrack/error.h"
 #include "isotrack/meshing/convection.h"
 #include "isotrack/meshing/fit.h"
+#include "isotrack/meshing/flips.h"
 #include "isotrack/meshing/manifold.h"
 #include "isotrack/meshing/open_border.h"
 #include "isotrack/meshing/self_intersections.h"
@@ -41,6 +42,8 @@ constexpr double kMostSeeded = 0.05;  // of the particles; with more the next fr
 constexpr int kCertifyRounds = 24;
 constexpr int kFitSteps = 6;
 constexpr double kFitWideExponent = 0.5;
+constexpr int kFlipPasses = 3;
+constexpr double kFlipShare = 0.96;     // of the tolerance, for triangles on another diagonal
 constexpr double kAngleFloor = 2.0;     // resolutions: sharp edges are as round as the grid makes them
 constexpr double kLeastSpacing = 5e-4;  // resolutions: a single node inside may leave no more than that
 
@@ -373,6 +376,40 @@ struct Tracker::Impl {
                        least, next_id);
     }
 
+    /// Flips edges of sharp triangles, but for those whose flip makes the mesh miss crossings.
+    static void blunt(FrameMesh& mesh, Inspection& inspection, Inspector& inspector, const Surface& surface,
+                      const SizingLimits& l, std::map<std::string, double>& seconds) {
+        const StageTimer timer(seconds, "certify");
+        auto& triangles = mesh.carved.triangles;
+        for (int pass = 0; pass < kFlipPasses; ++pass) {
+            std::vector<Flip> flips = flip_sharp(mesh.vertices, triangles, surface, kFlipShare * l.tolerance);
+            if (flips.empty()) break;
+            for (const Flip& flip : flips)
+                for (const int t : flip.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
+            const std::size_t missed_before = inspection.missed.size();
+            const LatticeTopology topology = std::move(inspection.topology);
+            for (;;) {
+                inspection = inspector.inspect(mesh);
+                inspector.inspect_crossings(mesh, inspection);
+                if (inspection.missed.size() <= missed_before || flips.empty()) break;
+                const auto at_missed = [&](const Flip& flip) {
+                    Box box;
+                    for (const int t : flip.triangle)
+                        for (const int v : triangles[t]) box.extend(mesh.vertices[v]);
+                    return std::any_of(
+                        inspection.missed.begin(), inspection.missed.end(),
+                        [&](const auto& c) { return box.exteriorDistance(c.point) <= l.tolerance; });
+                };
+                const auto kept = std::stable_partition(flips.begin(), flips.end(),
+                                                        [&](const Flip& f) { return !at_missed(f); });
+                const auto from = kept == flips.end() ? flips.begin() : kept;
+                std::for_each(from, flips.end(), [&](const Flip& flip) { undo(flip, triangles); });
+                flips.erase(from, flips.end());
+            }
+            inspection.topology = topology;
+        }
+    }
+
     /// The newborn move like the neighbours that were there before; alone among newborn they rest.
     void inherit_velocities(const std::vector<Triangle>& triangles, Id first_new) {
         std::vector<int> count(particles.size(), 0);
@@ -552,6 +589,7 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         }
         tetrahedralise(false, seconds);
     }
+    if (options.method != Method::Paper) blunt(mesh, inspection, inspector, surface, l, seconds);
     frame.relocated += dt->profile().relocated - relocated;
     report(mesh, inspection, l, frame);
     remember(mesh);

@@ -15,8 +15,10 @@ struct CarvedSurface {
     std::vector<int> particle;  ///< Per output vertex: the particle it stands on; -1 for an edge midpoint.
     std::vector<Vec3>
         midpoints;  ///< Positions of the output vertices that stand on no particle: the last ones, in order.
-    std::vector<int> inside_cell;   ///< Per triangle: the cell behind it; midpoints split a triangle, both
-                                    ///< halves keep its cell.
+    static constexpr int kNoCell = -1;
+    /// Per triangle: the cell behind it; midpoints split a triangle, both halves keep its cell. kNoCell: it
+    /// was flipped and is no facet any more.
+    std::vector<int> inside_cell;
     std::vector<int> inside_facet;  ///< Per triangle: the index of that cell's vertex opposite the facet.
 
     struct Edge {
