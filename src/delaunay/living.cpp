@@ -270,14 +270,14 @@ LivingDelaunay::Star LivingDelaunay::star_at(int number, const Vec3& p) {
             break;
         }
     // Every facet of the star's cells, the link's among them: neither apex inside the other's sphere. Between
-    // two infinite cells that is the convexity of the hull.
+    // two infinite cells that is the convexity of the hull: where it is dented a cell is missing, but all
+    // that are there are embedded.
     for (std::size_t f = 0; f < cells.size() && star == Star::Delaunay; ++f)
         for (int k = 0; k < 4 && star == Star::Delaunay; ++k) {
             const Cell c = cells[f], other = c->neighbor(k);
             const Vertex apex = other->vertex(other->index(c));
-            const bool inside =
-                dt.is_infinite(apex) ? false : dt.side_of_sphere(c, apex->point()) == CGAL::ON_BOUNDED_SIDE;
-            if (inside) star = dt.is_infinite(c) ? Star::Broken : Star::EmbeddedOnly;
+            if (!dt.is_infinite(apex) && dt.side_of_sphere(c, apex->point()) == CGAL::ON_BOUNDED_SIDE)
+                star = Star::EmbeddedOnly;
         }
     v->set_point(before);
     return star;

@@ -35,7 +35,7 @@ public:
 
     enum class Star { Delaunay, EmbeddedOnly, Broken };
     /// What the cells around a vertex would be with the vertex at p: all positively oriented and each locally
-    /// Delaunay with its neighbours, only the first, or neither.
+    /// Delaunay with its neighbours (on the hull: convex), only the first, or neither.
     Star star_at(int number, const Vec3& p);
 
     void neighbours(int number, std::vector<int>& result) const;

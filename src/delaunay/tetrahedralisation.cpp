@@ -110,6 +110,8 @@ public:
         if (!dt_.has(vertex)) return;
         switch (dt_.star_at(vertex, to)) {
             case LivingDelaunay::Star::Delaunay:
+                // The paper leaves this open; the score tells how far the positions are apart: now they
+                // agree.
                 dt_.set_position(vertex, to);
                 score_[vertex] = 0;
                 return;
