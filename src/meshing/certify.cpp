@@ -163,6 +163,7 @@ void crossing_distances(const std::vector<Vec3>& points, const std::vector<Trian
     std::vector<char> wanted(crossings.size());
     for (std::size_t i = 0; i < crossings.size(); ++i) wanted[i] = distances[i] == kUnknownDistance;
     const auto search = [&](double reach) {
+        const std::vector<char> columns = grid.columns_of(wanted);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
             for (std::size_t t = range.begin(); t < range.end(); ++t) {
                 const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
@@ -171,13 +172,14 @@ void crossing_distances(const std::vector<Vec3>& points, const std::vector<Trian
                 Box box(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c));
                 box.min().array() -= reach;
                 box.max().array() += reach;
-                grid.for_each_in(box, [&](std::size_t i) {
+                const auto measure = [&](std::size_t i) {
                     if (!wanted[i]) return;
                     const double off_plane = normal.dot(crossings[i].point - a);
                     if (off_plane * off_plane > std::min(reach * reach, least[i].get())) return;
                     if (normal.dot(crossings[i].outward.cast<double>()) < kFacing) return;
                     least[i].take(squared_distance(crossings[i].point, a, b, c));
-                });
+                };
+                grid.for_each_in(box, measure, &columns);
             }
         });
         bool any = false;

@@ -39,4 +39,12 @@ CrossingGrid::CrossingGrid(std::vector<Surface::Crossing> crossings, double widt
     });
 }
 
+std::vector<char> CrossingGrid::columns_of(const std::vector<char>& wanted) const {
+    std::vector<char> result(first_.empty() ? 0 : first_.size() - 1, 0);
+    for (std::size_t column = 0; column < result.size(); ++column)
+        for (std::size_t c = first_[column]; c < first_[column + 1] && !result[column]; ++c)
+            result[column] = wanted[c];
+    return result;
+}
+
 }  // namespace isotrack

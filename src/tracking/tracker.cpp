@@ -379,7 +379,7 @@ struct Tracker::Impl {
     /// Flips edges of sharp triangles, but for those whose flip makes the mesh miss crossings.
     static void blunt(FrameMesh& mesh, Inspection& inspection, Inspector& inspector, const Surface& surface,
                       const SizingLimits& l, std::map<std::string, double>& seconds) {
-        const StageTimer timer(seconds, "certify");
+        const StageTimer timer(seconds, "flip");
         auto& triangles = mesh.carved.triangles;
         for (int pass = 0; pass < kFlipPasses; ++pass) {
             std::vector<Flip> flips = flip_sharp(mesh.vertices, triangles, surface, kFlipShare * l.tolerance);

@@ -20,9 +20,9 @@ public:
 
     const std::vector<Surface::Crossing>& crossings() const { return crossings_; }
 
-    /// Calls `visit` with the index of every crossing in `box`.
+    /// Calls `visit` with the index of every crossing in `box`; of those in columns that are set only, if given.
     template <typename Visit>
-    void for_each_in(const Box& box, const Visit& visit) const {
+    void for_each_in(const Box& box, const Visit& visit, const std::vector<char>* columns = nullptr) const {
         int from[2], to[2];
         for (int axis = 0; axis < 2; ++axis) {
             from[axis] = column(axis, box.min()[axis]);
@@ -32,6 +32,7 @@ public:
         for (int x = from[0]; x <= to[0]; ++x)
             for (int y = from[1]; y <= to[1]; ++y) {
                 const std::size_t at = static_cast<std::size_t>(x) * count_[1] + y;
+                if (columns && !(*columns)[at]) continue;
                 const auto end = crossings_.begin() + static_cast<std::ptrdiff_t>(first_[at + 1]);
                 auto c = std::lower_bound(crossings_.begin() + static_cast<std::ptrdiff_t>(first_[at]), end,
                                           box.min().z(), [](const Surface::Crossing& crossing, double z) {
@@ -43,6 +44,9 @@ public:
                         visit(static_cast<std::size_t>(c - crossings_.begin()));
             }
     }
+
+    /// Flags per column: it holds a crossing that is wanted. `wanted`: a flag per crossing.
+    std::vector<char> columns_of(const std::vector<char>& wanted) const;
 
 private:
     int column(int axis, double place) const {
