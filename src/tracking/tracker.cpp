@@ -36,7 +36,7 @@ constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3, kMendingSweeps = 3;
 constexpr int kMostMendings = 3;
 constexpr double kFew = 0.015;  // of the particles: few enough to be added by certify, without relaxation
-constexpr int kFollowSweeps = 2;
+constexpr int kFollowSweeps = 3;
 constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr int kCertifyRounds = 24;
@@ -428,8 +428,7 @@ struct Tracker::Impl {
     }
 
     void follow(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
-    std::size_t make_room(const Surface& surface, const SizingLimits& l, const CrossingGrid& crossings,
-                          bool thorough, TrackedFrame& frame);
+    void make_room(const Surface& surface, TrackedFrame& frame);
     void remember(const FrameMesh& mesh);
     void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
@@ -465,28 +464,12 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool w
     }
 }
 
-/// Adds particles where the mesh fails and relaxes: here their surroundings can still make room. Returns how
-/// many.
-std::size_t Tracker::Impl::make_room(const Surface& surface, const SizingLimits& l,
-                                     const CrossingGrid& crossings, bool thorough, TrackedFrame& frame) {
-    tetrahedralise(true, frame.seconds);
-    FrameMesh mesh = carve_mesh(surface, frame.seconds);
-    Fitted none;
-    if (options.fit) fit_vertices(mesh, none, surface, frame.seconds);
-    std::size_t added = 0;
-    {
-        const StageTimer timer(frame.seconds, "certify");
-        Inspector inspector(surface, l, crossings);
-        Inspection inspection = inspector.inspect(mesh);
-        memory.evidence.error = errors_at_particles(mesh, inspection.errors, particles.size());
-        if (thorough) inspector.inspect_crossings(mesh, inspection);
-        added = mend(mesh, inspection, surface, l);
-    }
+/// Spreads the particles after others were added among them.
+void Tracker::Impl::make_room(const Surface& surface, TrackedFrame& frame) {
     tetrahedralise(false, frame.seconds);
-    mesh = carve_mesh(surface, frame.seconds);
+    const FrameMesh mesh = carve_mesh(surface, frame.seconds);
     const StageTimer timer(frame.seconds, "relax");
     frame.sweeps += relax(particles, two_rings(mesh), surface, kMendingSweeps);
-    return added;
 }
 
 /// What the last mesh knows is good enough for the next frame's particles: no DT is needed.
@@ -555,41 +538,58 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         follow(surface, l, frame);
     else
         sample(surface, l, warm, frame);
-    if (options.method != Method::Paper)
-        for (int mending = 0; mending < kMostMendings; ++mending)
-            if (static_cast<double>(make_room(surface, l, crossings, mending > 0, frame)) <
-                kFew * static_cast<double>(particles.size()))
-                break;
-    tetrahedralise(true, seconds);
     FrameMesh mesh;
     Fitted fitted;
-    Inspector inspector(surface, l, crossings);
+    std::optional<Inspector> inspector;
     Inspection inspection;
-    // What takes longer to look at is looked at when all before it passes.
-    for (int round = 0;; ++round) {
+    const auto make_mesh = [&] {
         mesh = carve_mesh(surface, seconds);
         if (options.fit) fit_vertices(mesh, fitted, surface, seconds);
+    };
+    // As long as many particles have to be added their surroundings make room for them.
+    std::size_t added = 0;
+    for (int mending = 0;; ++mending) {
+        tetrahedralise(true, seconds);
+        inspector.emplace(surface, l, crossings);
+        fitted = {};
+        make_mesh();
+        const StageTimer timer(seconds, "certify");
+        inspection = inspector->inspect(mesh);
+        if (options.method == Method::Paper) break;
+        memory.evidence.error = errors_at_particles(mesh, inspection.errors, particles.size());
+        if (mending > 0) inspector->inspect_crossings(mesh, inspection);
+        added = mend(mesh, inspection, surface, l);
+        if (mending == kMostMendings ||
+            static_cast<double>(added) < kFew * static_cast<double>(particles.size()))
+            break;
+        make_room(surface, frame);
+    }
+    // What takes longer to look at is looked at when all before it passes.
+    for (int round = 0;; ++round) {
+        if (round > 0 || added > 0) {
+            tetrahedralise(false, seconds);
+            make_mesh();
+        }
         const StageTimer timer(seconds, "certify");
         const bool last = options.method == Method::Paper || round == kCertifyRounds;
         const auto passes = [&] { return last || mend(mesh, inspection, surface, l) == 0; };
-        inspection = inspector.inspect(mesh);
+        inspection = inspector->inspect(mesh);
         bool good = passes();
         if (good && options.fit && undo_crossing_fits(mesh)) {
             fitted.take(mesh, particles.size());
-            inspection = inspector.inspect(mesh);
+            inspection = inspector->inspect(mesh);
             good = passes();
         }
         if (good) {
-            inspector.inspect_crossings(mesh, inspection);
+            inspector->inspect_crossings(mesh, inspection);
             good = passes();
         }
         if (good) {
-            inspector.inspect_topology(mesh, inspection);
+            inspector->inspect_topology(mesh, inspection);
             if (passes()) break;
         }
-        tetrahedralise(false, seconds);
     }
-    if (options.method != Method::Paper) blunt(mesh, inspection, inspector, surface, l, seconds);
+    if (options.method != Method::Paper) blunt(mesh, inspection, *inspector, surface, l, seconds);
     frame.relocated += dt->profile().relocated - relocated;
     report(mesh, inspection, l, frame);
     remember(mesh);
