@@ -151,6 +151,31 @@ bool is_simple(std::uint32_t inside) {
     return (reached & ~spread(lowest(reached), outside, around.beside)) == 0;
 }
 
+/// Whether volumeToMesh joins an inside node with the one at `to`, inside as well: through a face always;
+/// across the diagonal of a face whose other two nodes are outside unless both cells that share the face hold
+/// no more inside nodes than these two and one next to one of them; never across a cell. `inside`: of the
+/// nodes around the first, as above. Nodes that are joined through a third one are so anyway.
+bool is_joined(std::uint32_t inside, const Node& to) {
+    const auto in = [&](const Node& n) { return (inside >> bit_of(n[0], n[1], n[2]) & 1u) != 0; };
+    const auto axes = 3 - std::count(to.begin(), to.end(), 0);
+    if (axes != 2) return axes == 1;
+    const auto off = static_cast<int>(std::find(to.begin(), to.end(), 0) - to.begin());  // across the face
+    bool few = true;
+    for (const int side : {-1, 1}) {
+        int beside_ends = 0, beside_others = 0;
+        for (const int first : {0, 1})
+            for (const int second : {0, 1}) {
+                Node n;
+                n[off] = side;
+                n[(off + 1) % 3] = first * to[(off + 1) % 3];
+                n[(off + 2) % 3] = second * to[(off + 2) % 3];
+                (first == second ? beside_ends : beside_others) += in(n);
+            }
+        few = few && beside_ends <= 1 && beside_others == 0;
+    }
+    return !few;
+}
+
 }  // namespace
 
 LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
@@ -237,11 +262,40 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
                             is_wrong ? static_cast<int>(at - wrong.begin()) : -1;
                     }
     });
+    // Inside nodes that hang together, none of them inside the mesh, are a component that is lost even where
+    // a corner joins them to others.
+    std::vector<std::uint32_t> truth(wrong.size());
+    std::vector<char> lost(wrong.size());
+    for (std::size_t w = 0; w < wrong.size(); ++w) {
+        truth[w] = around[w].inside;
+        for (int bit = 0; bit < 27; ++bit)
+            if (around[w].wrong[bit] >= 0) truth[w] ^= 1u << bit;
+        lost[w] = (truth[w] >> bit_of(0, 0, 0) & 1u) != 0;
+    }
+    const auto is_held = [&](std::size_t w) {
+        for (int x = -1; x <= 1; ++x)
+            for (int y = -1; y <= 1; ++y)
+                for (int z = -1; z <= 1; ++z) {
+                    const int bit = bit_of(x, y, z), other = around[w].wrong[bit];
+                    if ((truth[w] >> bit & 1u) != 0 && (other < 0 || !lost[other]) &&
+                        is_joined(truth[w], {x, y, z}))
+                        return true;
+                }
+        return false;
+    };
+    for (bool any = true; any;) {
+        any = false;
+        for (std::size_t w = 0; w < wrong.size(); ++w) {
+            if (!lost[w] || !is_held(w)) continue;
+            lost[w] = 0;
+            any = true;
+        }
+    }
     std::vector<char> put_right(wrong.size(), 0);
     for (bool any = true; any;) {
         any = false;
         for (std::size_t w = 0; w < wrong.size(); ++w) {
-            if (put_right[w] || !is_simple(around[w].inside)) continue;
+            if (put_right[w] || lost[w] || !is_simple(around[w].inside)) continue;
             put_right[w] = 1;
             any = true;
             for (int bit = 0; bit < 27; ++bit)  // bit 26 - b is the way back

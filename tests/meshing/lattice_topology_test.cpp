@@ -5,7 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
+#include "isotrack/compare/baselines.h"
+#include "isotrack/meshing/mesh_topology.h"
+#include "isotrack/surface/level_set.h"
 #include "isotrack/surface/shapes.h"
 #include "support/meshes.h"
 
@@ -97,6 +101,48 @@ TEST(LatticeTopology, HoldsForMeshesAlignedWithTheLattice) {
     const LatticeTopology found = topology_of(mesh, *surface);
     EXPECT_TRUE(found.faults.empty());
     EXPECT_FALSE(found.has_specks);
+}
+
+/// A grid whose inside nodes are these.
+LevelSet level_set_of(const std::vector<openvdb::Coord>& inside) {
+    const auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    for (auto c = openvdb::CoordBBox(openvdb::Coord(-8), openvdb::Coord(8)).begin(); c; ++c)
+        grid->tree().setValueOn(*c, 0.6f);
+    for (const openvdb::Coord& c : inside) grid->tree().setValueOn(c, -0.4f);
+    return LevelSet(grid);
+}
+
+TEST(LatticeTopology, CountsAComponentThatVolumeToMeshPartsFromOthersAsMissing) {
+    std::mt19937 random(3);
+    int parted = 0, joined = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+        // A slab with a rough layer on it, and a node that shares an edge or a corner with others, but no
+        // face.
+        std::vector<openvdb::Coord> inside;
+        for (int x = -4; x <= 4; ++x)
+            for (int y = -4; y <= 4; ++y) {
+                for (int z = -2; z < 0; ++z) inside.emplace_back(x, y, z);
+                if ((x != 0 || y != 0) && random() % 100 < 30) inside.emplace_back(x, y, 0);
+            }
+        const openvdb::Coord loose(0, 0, 1);
+        inside.emplace_back(0, 0, 1);
+        const LevelSet with = level_set_of(inside);
+        const TriangleMesh truth = volume_to_mesh(with);
+        inside.pop_back();
+        const TriangleMesh without = volume_to_mesh(level_set_of(inside));
+        const bool is_parted = mesh_topology(truth).components > mesh_topology(without).components;
+        const LatticeTopology found = topology_of(without, with);
+        const bool has_fault = std::any_of(found.faults.begin(), found.faults.end(), [&](const Vec3& f) {
+            return (f - Vec3(loose.x(), loose.y(), loose.z())).norm() < 1e-9;
+        });
+        if (is_parted) {
+            EXPECT_TRUE(has_fault) << "trial " << trial;
+        }
+        (is_parted ? parted : joined) += 1;
+    }
+    EXPECT_GT(parted, 10);
+    EXPECT_GT(joined, 10);
 }
 
 }  // namespace

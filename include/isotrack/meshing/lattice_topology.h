@@ -13,7 +13,8 @@ namespace isotrack {
 struct LatticeTopology {
     /// Nodes on the wrong side of the mesh whose side matters. The other wrong nodes, within the tolerance,
     /// can be put right one after the other, each a simple point, so that they change no component, handle or
-    /// void. World positions, in the order of the nodes.
+    /// void. Also all nodes of a component that volumeToMesh parts from others it touches across an edge or a
+    /// corner, where the mesh has none of them. World positions, in the order of the nodes.
     std::vector<Vec3> faults;
     /// Per triangle: it belongs to a component that holds no node on its own. No such thing is in a grid.
     std::vector<char> speck;
