@@ -175,7 +175,7 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
             log_k2[i] = -2.0 * std::log(h);
         else
             log_k2[i] =
-                std::log(std::clamp(e / aim, 0.5, 2.0) / (h * actual_spacing(particles, adjacency, i)));
+                std::log(std::clamp(e / aim, limits.thinning, 2.0) / (h * actual_spacing(particles, adjacency, i)));
     });
     std::vector<double> next(n);
     for_each_particle(n, [&](std::size_t i) {

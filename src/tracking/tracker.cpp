@@ -38,6 +38,7 @@ constexpr int kMostMendings = 3;
 constexpr double kFew = 0.015;  // of the particles: few enough to be added by certify, without relaxation
 constexpr int kFollowSweeps = 3;
 constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
+constexpr double kFollowThinning = 0.6;           // what certify added last lives longer
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr int kCertifyRounds = 24;
 constexpr int kFitSteps = 6;
@@ -477,7 +478,9 @@ void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, Tracke
     {
         const StageTimer timer(frame.seconds, "size");
         memory.grow(particles.size());
-        update_spacing(particles, memory.ring, memory.evidence, l);
+        SizingLimits slow = l;
+        slow.thinning = kFollowThinning;
+        update_spacing(particles, memory.ring, memory.evidence, slow);
     }
     const StageTimer timer(frame.seconds, "relax");
     auto keep = uncrowded(particles, memory.ring, kFollowBand);

@@ -20,6 +20,7 @@ struct SizingLimits {
     /// is above the lower quartile h_0 of all, (h_0 / h)^a of it, which spends more on flat parts and lowers
     /// the mean square: 1 would be best for that alone.
     double wide_exponent = 0.0;
+    double thinning = 0.5;  ///< Least factor of 1/h^2 in one update: near 1 a population thins out slowly.
 };
 
 /// What the mesh of the last build says about each particle. One entry per particle.
@@ -38,11 +39,11 @@ double spacing_from_curvature(Surface::Probe& probe, const Vec3& p, const Vec3& 
 /// The paper's k_nd: sqrt(max over neighbours on the same side of (1 - n_i . n_j) / r_ij^2), 1 / world units.
 double normal_deviation(const Particles& particles, const Adjacency& adjacency, std::size_t i);
 
-/// Feeds the measured error back: 1/h^2 becomes error / (share of the tolerance), at least 1/2 and at most 2,
-/// over the wanted spacing times the actual one, since the error is that of the actual and a population with
-/// a dead zone lags behind what is wanted; then the angle, the thickness and the limits bound it, and the
-/// gradation h_i <= h_j + 0.25 r_ij smooths it. The stretch becomes (kappa_1 / kappa_2)^(1/2), at most 1.4,
-/// from the curvature of the normals around the particle.
+/// Feeds the measured error back: 1/h^2 becomes error / (share of the tolerance), at least `thinning` and at
+/// most 2, over the wanted spacing times the actual one, since the error is that of the actual and a
+/// population with a dead zone lags behind what is wanted; then the angle, the thickness and the limits bound
+/// it, and the gradation h_i <= h_j + 0.25 r_ij smooths it. The stretch becomes (kappa_1 / kappa_2)^(1/2), at
+/// most 1.4, from the curvature of the normals around the particle.
 void update_spacing(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence,
                     const SizingLimits& limits);
 
