@@ -60,8 +60,9 @@ double area2(const Vec3& p, const Vec3& q, double x, double y) {
 
 std::vector<Hit> hits_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                          const std::vector<int>& component) {
-    std::vector<Hit> hits;
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
+    constexpr std::size_t kBlock = 512;
+    std::vector<std::vector<Hit>> blocks((triangles.size() + kBlock - 1) / kBlock);
+    const auto add_hits = [&](std::size_t t, std::vector<Hit>& hits) {
         const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]], &c = points[triangles[t][2]];
         const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
         for (int x = static_cast<int>(std::ceil(low.x() - kBeside[0])); x + kBeside[0] <= high.x(); ++x)
@@ -71,7 +72,13 @@ std::vector<Hit> hits_of(const std::vector<Vec3>& points, const std::vector<Tria
                 if (!((wa > 0.0 && wb > 0.0 && wc > 0.0) || (wa < 0.0 && wb < 0.0 && wc < 0.0))) continue;
                 hits.push_back({x, y, component[t], (wa * a.z() + wb * b.z() + wc * c.z()) / (wa + wb + wc)});
             }
-    }
+    };
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
+        const std::size_t end = std::min(triangles.size(), (block + 1) * kBlock);
+        for (std::size_t t = block * kBlock; t < end; ++t) add_hits(t, blocks[block]);
+    });
+    std::vector<Hit> hits;
+    for (const auto& block : blocks) hits.insert(hits.end(), block.begin(), block.end());
     return hits;
 }
 
