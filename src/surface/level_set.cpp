@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "isotrack/error.h"
@@ -181,8 +182,8 @@ private:
 /// A lattice edge that crosses the surface: from `from`, `fraction` of a voxel along `axis`.
 struct CrossedEdge {
     Coord from;
-    int axis;
     float fraction;
+    std::int8_t axis;
     bool outward;    ///< `from` is the end inside.
     bool at_border;  ///< One end is an inactive voxel.
 
@@ -210,7 +211,7 @@ std::vector<CrossedEdge> find_crossings(const FloatTree& tree) {
                 const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
                 const bool border = !accessor.isValueOn(from) ||
                                     !accessor.isValueOn(from.offsetBy(axis == 0, axis == 1, axis == 2));
-                found.push_back({from, axis, fraction, a < 0.0f, border});
+                found.push_back({from, fraction, static_cast<std::int8_t>(axis), a < 0.0f, border});
             };
             constexpr int kStride[3] = {kLeafDim * kLeafDim, kLeafDim, 1};
             for (int i = 0; i < static_cast<int>(Leaf::SIZE); ++i) {
@@ -347,7 +348,7 @@ struct LevelSet::Impl {
     double reach = 0.0;
     std::size_t active_voxels = 0, border_crossings = 0;
     openvdb::GridBase::ConstPtr source;  // as it came
-    std::vector<Surface::Crossing> crossings;
+    std::vector<CrossedEdge> crossed;
     Box bounds;
 
     Impl(const openvdb::GridBase::ConstPtr& as_it_came, const LevelSetOptions& options)
@@ -396,12 +397,8 @@ struct LevelSet::Impl {
         }
         const double background = grid->background();
         reach = std::clamp(background, map.voxel_size, kFarVoxels * map.voxel_size);
-        crossings.reserve(found.size());
-        for (const CrossedEdge& c : found) {
-            const Vec3 outward = map.linear.col(c.axis).normalized() * (c.outward ? 1.0 : -1.0);
-            crossings.push_back({map.to_world(c.index()), outward.cast<float>()});
-            bounds.extend(crossings.back().point);
-        }
+        crossed = std::move(found);
+        for (const CrossedEdge& edge : crossed) bounds.extend(map.to_world(edge.index()));
     }
 
     bool is_active(const Coord& c) const {
@@ -521,10 +518,19 @@ bool LevelSet::at_border(const Vec3& p) const {
     return false;
 }
 std::vector<Surface::Crossing> LevelSet::crossings() const {
-    return impl_->crossings;
+    std::vector<Crossing> result(impl_->crossed.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.size(), 4096), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            const CrossedEdge& edge = impl_->crossed[i];
+            const Vec3 along = impl_->map.linear.col(edge.axis).normalized();
+            result[i] = {impl_->map.to_world(edge.index()),
+                         (edge.outward ? 1.0f : -1.0f) * along.cast<float>()};
+        }
+    });
+    return result;
 }
 bool LevelSet::empty() const {
-    return impl_->crossings.empty();
+    return impl_->crossed.empty();
 }
 std::size_t LevelSet::active_voxels() const {
     return impl_->active_voxels;
@@ -533,7 +539,7 @@ double LevelSet::value_scale() const {
     return impl_->scale;
 }
 std::size_t LevelSet::crossing_count() const {
-    return impl_->crossings.size();
+    return impl_->crossed.size();
 }
 std::size_t LevelSet::border_crossings() const {
     return impl_->border_crossings;

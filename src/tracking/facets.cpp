@@ -10,7 +10,7 @@ std::vector<Facet> facets_of(const CarvedSurface& carved, const std::vector<Vec3
         const bool whole = carved.inside_cell[t] >= 0 && carved.particle[i] >= 0 && carved.particle[j] >= 0 &&
                            carved.particle[k] >= 0;
         facets.push_back({whole ? 4 * carved.inside_cell[t] + carved.inside_facet[t] : -1,
-                          {vertices[i], vertices[j], vertices[k]}});
+                          {vertices[i].cast<float>(), vertices[j].cast<float>(), vertices[k].cast<float>()}});
     }
     return facets;
 }

@@ -12,11 +12,11 @@ namespace isotrack {
 struct Facet {
     int key;  ///< Ascending over a mesh but for halves of split triangles and triangles on a flipped
               ///< diagonal, which have -1 and equal nothing.
-    std::array<Vec3, 3> corner;
+    std::array<Eigen::Vector3f, 3> corner;  ///< Vertices are rounded to floats before they are looked at.
     bool operator==(const Facet& o) const { return key >= 0 && key == o.key && corner == o.corner; }
 };
 
-/// One per triangle, in their order.
+/// One per triangle, in their order. `vertices` hold no more digits than floats.
 std::vector<Facet> facets_of(const CarvedSurface& carved, const std::vector<Vec3>& vertices);
 
 /// Calls `same` with the numbers of each facet that is in both, in `now` and in `before`; `came` with those

@@ -139,8 +139,9 @@ void Inspector::inspect_crossings(const FrameMesh& mesh, Inspection& inspection)
     } else {
         const auto forget = [&](const Facet& facet) {
             const auto& [a, b, c] = facet.corner;
-            const Vec3 reach = Vec3::Constant(cutoff);
-            crossings_.for_each_in(Box(a.cwiseMin(b).cwiseMin(c) - reach, a.cwiseMax(b).cwiseMax(c) + reach),
+            const Vec3 reach = Vec3::Constant(cutoff), low = a.cwiseMin(b).cwiseMin(c).cast<double>(),
+                       high = a.cwiseMax(b).cwiseMax(c).cast<double>();
+            crossings_.for_each_in(Box(low - reach, high + reach),
                                    [&](std::size_t i) { distances_[i] = kUnknownDistance; });
         };
         compare(

@@ -567,7 +567,7 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
             break;
         make_room(surface, frame);
     }
-    // What takes longer to look at is looked at when all before it passes.
+    // The topology, which takes longer to look at, is looked at when all else passes.
     for (int round = 0;; ++round) {
         if (round > 0 || added > 0) {
             tetrahedralise(false, seconds);
@@ -577,13 +577,11 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         const bool last = options.method == Method::Paper || round == kCertifyRounds;
         const auto passes = [&] { return last || mend(mesh, inspection, surface, l) == 0; };
         inspection = inspector->inspect(mesh);
+        inspector->inspect_crossings(mesh, inspection);
         bool good = passes();
         if (good && options.fit && undo_crossing_fits(mesh)) {
             fitted.take(mesh, particles.size());
             inspection = inspector->inspect(mesh);
-            good = passes();
-        }
-        if (good) {
             inspector->inspect_crossings(mesh, inspection);
             good = passes();
         }
