@@ -87,56 +87,15 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     return in_vain;
 }
 
-void Inspector::take(const std::vector<double>& distances, const std::vector<Surface::Crossing>& crossings,
-                     Inspection& result) const {
-    result.missed.clear();
-    result.farthest_crossing = 0.0;
-    result.lost_crossings = 0;
-    double sum = 0.0;
-    for (std::size_t c = 0; c < crossings.size(); ++c) {
-        if (!(distances[c] <= kCertified * limits_.tolerance)) result.missed.push_back(crossings[c]);
-        if (!std::isfinite(distances[c])) {
-            ++result.lost_crossings;
-            continue;
-        }
-        result.farthest_crossing = std::max(result.farthest_crossing, distances[c]);
-        sum += distances[c] * distances[c];
-    }
-    const std::size_t found = crossings.size() - result.lost_crossings;
-    if (found > 0) result.crossings_mean_square = sum / static_cast<double>(found);
-}
-
-Inspection Inspector::inspect(const FrameMesh& mesh) {
-    Inspection result;
-    std::vector<Vec3> in_vain = measure_errors(mesh, result);
-    const CrossingGrid grid(missed_, 2.0 * surface_.resolution());
-    take(crossing_distances(mesh.vertices, mesh.carved.triangles, grid, kLostAt * limits_.tolerance),
-         grid.crossings(), result);
-    // What is still missed with a particle on its place is finer than the particles around it.
-    for (const auto& crossing : result.missed) in_vain.push_back(crossing.point);
-    doubt(in_vain, kVainSpacing, result);
-    return result;
-}
-
-void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const {
-    const Vec3 near = Vec3::Constant(kFaultReach * surface_.resolution());
-    std::vector<std::size_t> doubtful;
-    for (const Vec3& place : places)
-        crossings_.for_each_in(Box(place - near, place + near), [&](std::size_t c) {
-            if ((crossings_.crossings()[c].point - place).norm() <= near.x()) doubtful.push_back(c);
-        });
-    std::sort(doubtful.begin(), doubtful.end());
-    doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
-    for (const std::size_t c : doubtful)
-        inspection.doubtful.push_back({crossings_.crossings()[c].point, spacing * surface_.resolution()});
-}
-
-void Inspector::inspect_crossings(const FrameMesh& mesh, Inspection& inspection) {
-    // Crossings near triangles that came or went.
+std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection& result) {
+    const std::vector<Surface::Crossing>& crossings = crossings_.crossings();
     const double cutoff = kLostAt * limits_.tolerance;
+    std::vector<char> missed_before(crossings.size(), 0);
     if (distances_.empty()) {
-        distances_.assign(crossings_.crossings().size(), kUnknownDistance);
+        distances_.assign(crossings.size(), kUnknownDistance);
     } else {
+        for (std::size_t c = 0; c < crossings.size(); ++c) missed_before[c] = is_missed(distances_[c]);
+        // Those near triangles that came or went are to be measured again.
         const auto forget = [&](const Facet& facet) {
             const auto& [a, b, c] = facet.corner;
             const Vec3 reach = Vec3::Constant(cutoff), low = a.cwiseMin(b).cwiseMin(c).cast<double>(),
@@ -150,8 +109,56 @@ void Inspector::inspect_crossings(const FrameMesh& mesh, Inspection& inspection)
     }
     crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff, distances_);
     reached_ = facets_;
-    take(distances_, crossings_.crossings(), inspection);
-    missed_ = inspection.missed;
+
+    std::vector<Vec3> in_vain;
+    double sum = 0.0;
+    for (std::size_t c = 0; c < crossings.size(); ++c) {
+        if (is_missed(distances_[c])) {
+            result.missed.push_back(crossings[c]);
+            if (missed_before[c]) in_vain.push_back(crossings[c].point);
+        }
+        if (!std::isfinite(distances_[c])) {
+            ++result.lost_crossings;
+            continue;
+        }
+        result.farthest_crossing = std::max(result.farthest_crossing, distances_[c]);
+        sum += distances_[c] * distances_[c];
+    }
+    const std::size_t found = crossings.size() - result.lost_crossings;
+    if (found > 0) result.crossings_mean_square = sum / static_cast<double>(found);
+    return in_vain;
+}
+
+Inspection Inspector::inspect(const FrameMesh& mesh) {
+    Inspection result;
+    doubt(measure_errors(mesh, result), kVainSpacing, result);
+    return result;
+}
+
+Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
+    Inspection result;
+    std::vector<Vec3> in_vain = measure_errors(mesh, result);
+    const std::vector<Vec3> missed = measure_distances(mesh, result);
+    in_vain.insert(in_vain.end(), missed.begin(), missed.end());
+    doubt(in_vain, kVainSpacing, result);
+    return result;
+}
+
+bool Inspector::is_missed(double distance) const {
+    return !(distance <= kCertified * limits_.tolerance);
+}
+
+void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const {
+    const Vec3 near = Vec3::Constant(kFaultReach * surface_.resolution());
+    std::vector<std::size_t> doubtful;
+    for (const Vec3& place : places)
+        crossings_.for_each_in(Box(place - near, place + near), [&](std::size_t c) {
+            if ((crossings_.crossings()[c].point - place).norm() <= near.x()) doubtful.push_back(c);
+        });
+    std::sort(doubtful.begin(), doubtful.end());
+    doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
+    for (const std::size_t c : doubtful)
+        inspection.doubtful.push_back({crossings_.crossings()[c].point, spacing * surface_.resolution()});
 }
 
 void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {

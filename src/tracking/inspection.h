@@ -41,20 +41,20 @@ public:
     Inspector(const Surface& surface, const SizingLimits& limits, const CrossingGrid& crossings)
         : surface_(surface), limits_(limits), crossings_(crossings) {}
 
-    /// Mesh to surface, and only those crossings that were missed when all were looked for last.
+    /// From mesh to surface alone.
     Inspection inspect(const FrameMesh& mesh);
-    /// Surface to mesh, for the mesh just inspected.
-    void inspect_crossings(const FrameMesh& mesh, Inspection& inspection);
-    /// And its topology.
+    /// From mesh to surface and back.
+    Inspection inspect_both_ways(const FrameMesh& mesh);
+    /// The topology of the mesh just inspected.
     void inspect_topology(const FrameMesh& mesh, Inspection& inspection);
 
 private:
+    /// Both return what cannot be mended, or was not when it was seen last.
+    std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
+    std::vector<Vec3> measure_distances(const FrameMesh& mesh, Inspection& result);
+    bool is_missed(double distance) const;
     /// Adds the crossings near some places to the doubtful ones; `spacing` in resolutions.
     void doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const;
-    /// Returns where errors that are too large cannot be mended, or were not when they were seen last.
-    std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
-    void take(const std::vector<double>& distances, const std::vector<Surface::Crossing>& crossings,
-              Inspection& result) const;
 
     const Surface& surface_;
     const SizingLimits& limits_;
@@ -63,8 +63,7 @@ private:
     std::vector<TriangleError> errors_;  // of each
     std::vector<Facet> reached_;         // of the last inspection of the crossings
     std::vector<double> distances_;      // to them, per crossing
-    std::vector<Surface::Crossing> missed_;
-    double fault_spacing_ = 0.8;  // resolutions; less from the second look on
+    double fault_spacing_ = 0.8;         // resolutions; less from the second look on
 };
 
 /// Where particles are missing: at the dual crossings of triangles with too large an error or, where the

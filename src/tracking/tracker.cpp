@@ -35,7 +35,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3, kMendingSweeps = 3;
 constexpr int kMostMendings = 3;
-constexpr double kFew = 0.015;  // of the particles: few enough to be added by certify, without relaxation
+constexpr double kFew = 0.008;  // of the particles: few enough to be added by certify, without relaxation
 constexpr int kFollowSweeps = 3;
 constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
 constexpr double kFollowThinning = 0.6;           // what certify added last lives longer
@@ -390,8 +390,7 @@ struct Tracker::Impl {
             const std::size_t missed_before = inspection.missed.size();
             const LatticeTopology topology = std::move(inspection.topology);
             for (;;) {
-                inspection = inspector.inspect(mesh);
-                inspector.inspect_crossings(mesh, inspection);
+                inspection = inspector.inspect_both_ways(mesh);
                 if (inspection.missed.size() <= missed_before || flips.empty()) break;
                 const auto at_missed = [&](const Flip& flip) {
                     Box box;
@@ -557,10 +556,9 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         fitted = {};
         make_mesh();
         const StageTimer timer(seconds, "certify");
-        inspection = inspector->inspect(mesh);
         if (options.method == Method::Paper) break;
+        inspection = mending == 0 ? inspector->inspect(mesh) : inspector->inspect_both_ways(mesh);
         memory.evidence.error = errors_at_particles(mesh, inspection.errors, particles.size());
-        if (mending > 0) inspector->inspect_crossings(mesh, inspection);
         added = mend(mesh, inspection, surface, l);
         if (mending == kMostMendings ||
             static_cast<double>(added) < kFew * static_cast<double>(particles.size()))
@@ -576,13 +574,11 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         const StageTimer timer(seconds, "certify");
         const bool last = options.method == Method::Paper || round == kCertifyRounds;
         const auto passes = [&] { return last || mend(mesh, inspection, surface, l) == 0; };
-        inspection = inspector->inspect(mesh);
-        inspector->inspect_crossings(mesh, inspection);
+        inspection = inspector->inspect_both_ways(mesh);
         bool good = passes();
         if (good && options.fit && undo_crossing_fits(mesh)) {
             fitted.take(mesh, particles.size());
-            inspection = inspector->inspect(mesh);
-            inspector->inspect_crossings(mesh, inspection);
+            inspection = inspector->inspect_both_ways(mesh);
             good = passes();
         }
         if (good) {

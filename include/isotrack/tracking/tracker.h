@@ -68,7 +68,7 @@ struct TrackedFrame {
     std::size_t lost_crossings = 0;  ///< Features below the grid's resolution that the mesh does not hold.
     bool within_tolerance = true;    ///< max_error is at most the tolerance and nothing is lost.
     std::map<std::string, double>
-        seconds;  ///< Per stage: carry, cover, size, relax, delaunay, convect, fit, certify.
+        seconds;  ///< Per stage: carry, cover, size, relax, delaunay, convect, fit, certify, flip.
 };
 
 /// Follows one surface. Not for concurrent use: frames depend on each other. Uses TBB inside.
