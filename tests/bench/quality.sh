@@ -75,6 +75,7 @@ for data in "$@"; do
         }' "$work/rows.csv"
 done
 echo
+echo "Measured on $(nproc) cores, $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)."
 echo "Wanted: error at most 0.5 voxel; smallest angle at least 15 degrees, 1 % quantile at least 30; components and Euler number of volumeToMesh; no crossing pairs; with --fit at most 0.85 of make_surface_mesh's triangles at the same error, and an RMS error at most 1.15 of decimation's at the same count."
 if [ -s "$work/missed" ]; then
     echo "Missed:"
