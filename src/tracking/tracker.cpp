@@ -35,7 +35,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 12, kWarmRounds = 2;
 constexpr int kSweepsPerRound = 3, kMendingSweeps = 3;
 constexpr int kMostMendings = 3;
-constexpr double kFew = 0.008;  // of the particles: few enough to be added by certify, without relaxation
+constexpr double kFew = 0.01;  // of the particles: few enough to be added by certify, without relaxation
 constexpr int kFollowSweeps = 3;
 constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
 constexpr double kFollowThinning = 0.6;           // what certify added last lives longer
