@@ -21,39 +21,16 @@
 #include "isotrack/sampling/sizing.h"
 #include "isotrack/surface/level_set.h"
 #include "isotrack/surface/shapes.h"
+#include "support/particles.h"
 
 namespace isotrack {
 namespace {
 
-SizingLimits limits_of(double edge) {
-    SizingLimits limits{};
-    limits.tolerance = 0.1 * edge;
-    limits.angle = 0.7;
-    limits.min_edge = limits.max_edge = edge;
-    return limits;
-}
-
-Particles random_on_unit_sphere(std::size_t count, double spacing) {
-    std::mt19937 random(5);
-    std::normal_distribution<double> normal;
-    Particles particles;
-    for (std::size_t i = 0; i < count; ++i) {
-        const Vec3 n = Vec3(normal(random), normal(random), normal(random)).normalized();
-        particles.add(n, n, spacing, static_cast<Id>(i));
-    }
-    return particles;
-}
-
-Adjacency adjacency_of(const Particles& particles) {
-    return vertex_adjacency(tetrahedralise(particles.position), particles.size());
-}
-
-double nearest_distance(const Particles& particles, std::size_t i) {
-    double least = 1e300;
-    for (std::size_t j = 0; j < particles.size(); ++j)
-        if (j != i) least = std::min(least, (particles.position[j] - particles.position[i]).norm());
-    return least;
-}
+using support::adjacency_of;
+using support::along_tube;
+using support::limits_of;
+using support::nearest_distance;
+using support::random_on_unit_sphere;
 
 TEST(Cover, LeavesNoCrossingFarFromAParticleThatFacesItsWay) {
     constexpr double kEdge = 0.2;
@@ -171,146 +148,6 @@ TEST(Cover, DoesNotLetOneSideOfASheetStandForTheOther) {
     std::size_t below = 0;
     for (std::size_t i = left; i < particles.size(); ++i) below += particles.normal[i].z() < -0.5;
     EXPECT_GT(below, 20u);
-}
-
-TEST(ColourGroups, HoldEveryParticleOnceAndNoTwoNeighbours) {
-    const Particles particles = random_on_unit_sphere(500, 0.15);
-    const Adjacency adjacency = adjacency_of(particles);
-    std::vector<int> colour(particles.size(), -1);
-    const auto groups = colour_groups(adjacency);
-    for (std::size_t g = 0; g < groups.size(); ++g)
-        for (const int i : groups[g]) {
-            EXPECT_EQ(colour[i], -1);
-            colour[i] = static_cast<int>(g);
-        }
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-        ASSERT_GE(colour[i], 0);
-        for (const int j : adjacency.of(i)) ASSERT_NE(colour[i], colour[j]);
-    }
-}
-
-TEST(Relax, SpreadsRandomPointsAndKeepsThemOnTheSurface) {
-    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
-    Particles particles = random_on_unit_sphere(400, 0.2);
-    const auto mean_nearest = [&] {
-        double sum = 0.0;
-        for (std::size_t i = 0; i < particles.size(); ++i) sum += nearest_distance(particles, i);
-        return sum / static_cast<double>(particles.size());
-    };
-    const double before = mean_nearest();
-    for (int round = 0; round < 10; ++round) relax(particles, adjacency_of(particles), *sphere, 3);
-    // A hexagonal packing of 400 points would have them 0.19 apart.
-    EXPECT_GT(mean_nearest(), 1.5 * before);
-    EXPECT_GT(mean_nearest(), 0.75 * 0.19);
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-        EXPECT_NEAR(particles.position[i].norm(), 1.0, 1e-4);
-        EXPECT_LT((particles.normal[i] - particles.position[i].normalized()).norm(), 1e-4);
-    }
-}
-
-TEST(Relax, PacksNearlyAsDenselyAsHexagons) {
-    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
-    const std::size_t count = 600;
-    const double ideal = std::sqrt(8.0 * 3.14159265358979 / (std::sqrt(3.0) * static_cast<double>(count)));
-    Particles particles = random_on_unit_sphere(count, ideal);
-    for (int sweep = 0; sweep < 30; ++sweep) relax(particles, adjacency_of(particles), *sphere, 1);
-    double least = 1e300;
-    for (std::size_t i = 0; i < count; ++i) least = std::min(least, nearest_distance(particles, i));
-    EXPECT_GE(least, 0.75 * ideal);
-}
-
-TEST(Relax, FollowsTheSpacingThatIsAskedFor) {
-    // Twice as dense on the right as on the left.
-    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
-    Particles particles = random_on_unit_sphere(800, 0.1);
-    const auto wanted = [](const Vec3& p) { return 0.12 - 0.04 * p.x(); };
-    for (int round = 0; round < 40; ++round) {
-        for (std::size_t i = 0; i < particles.size(); ++i)
-            particles.spacing[i] = wanted(particles.position[i]);
-        relax(particles, adjacency_of(particles), *sphere, 3);
-    }
-    double left = 0.0, right = 0.0;
-    int lefts = 0, rights = 0;
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-        const double d = nearest_distance(particles, i);
-        if (particles.position[i].x() < -0.7) left += d, ++lefts;
-        if (particles.position[i].x() > 0.7) right += d, ++rights;
-    }
-    EXPECT_GT(left / lefts, 1.2 * right / rights);
-}
-
-/// Along the tube of a torus around the third axis.
-Vec3 along_tube(const Vec3& p) {
-    return Vec3(-p.y(), p.x(), 0.0).normalized();
-}
-
-/// How many times longer the edges to the six nearest are along the tube than across it, nearest when lengths
-/// along it count sqrt(s) times less and across it more.
-double elongation_on_torus(const Particles& particles, double s) {
-    double along = 0.0, across = 0.0;
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-        const Vec3 t = along_tube(particles.position[i]);
-        std::vector<std::array<double, 3>> near;  // distance, squares along and across
-        for (std::size_t j = 0; j < particles.size(); ++j) {
-            if (j == i) continue;
-            const Vec3 r = particles.position[j] - particles.position[i];
-            const double a = r.dot(t) * r.dot(t), b = r.squaredNorm() - a;
-            near.push_back({a / s + b * s, a, b});
-        }
-        std::nth_element(near.begin(), near.begin() + 5, near.end());
-        for (int k = 0; k < 6; ++k) {
-            along += near[k][1];
-            across += near[k][2];
-        }
-    }
-    return std::sqrt(along / across);
-}
-
-TEST(Relax, LeavesMoreRoomAlongTheStretch) {
-    const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.3, 0.05);
-    for (const double s : {1.0, 1.4}) {
-        Particles particles;
-        Id next_id = 0;
-        cover(particles, *torus, CrossingGrid(*torus), limits_of(0.12), 1, next_id);
-        for (int round = 0; round < 12; ++round) {
-            for (std::size_t i = 0; i < particles.size(); ++i)
-                particles.stretch[i] = std::sqrt(s - 1.0) * along_tube(particles.position[i]);
-            relax(particles, adjacency_of(particles), *torus, 3);
-        }
-        EXPECT_NEAR(elongation_on_torus(particles, s), s, 0.1);
-        if (s == 1.0) {  // to look for them along the tube does not put them there
-            EXPECT_LT(elongation_on_torus(particles, 1.4), 1.25);
-        }
-    }
-}
-
-TEST(Relax, GivesTheSameBitsAtAnyThreadCount) {
-    const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.3, 0.05);
-    const auto run = [&](std::size_t threads) {
-        const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-        Particles particles;
-        Id next_id = 0;
-        cover(particles, *torus, CrossingGrid(*torus), limits_of(0.12), 1, next_id);
-        for (int round = 0; round < 3; ++round) relax(particles, adjacency_of(particles), *torus, 4);
-        return particles;
-    };
-    const Particles one = run(1), two = run(2);
-    EXPECT_EQ(one.position, two.position);
-    EXPECT_EQ(one.normal, two.normal);
-}
-
-TEST(Relax, StopsWhenAllAreAtRest) {
-    // The corners of an icosahedron cannot be better placed.
-    const double g = 0.5 * (1.0 + std::sqrt(5.0));
-    Particles particles;
-    for (const double a : {-1.0, 1.0})
-        for (const double b : {-g, g})
-            for (const Vec3& p : {Vec3(0, a, b), Vec3(a, b, 0), Vec3(b, 0, a)})
-                particles.add(p.normalized(), p.normalized(), 1.0, static_cast<Id>(particles.size()));
-    const auto start = particles.position;
-    EXPECT_LE(relax(particles, adjacency_of(particles), *shapes::sphere({0, 0, 0}, 1.0, 0.1), 50), 3);
-    for (std::size_t i = 0; i < start.size(); ++i) EXPECT_LT((particles.position[i] - start[i]).norm(), 0.05);
-    EXPECT_EQ(relax(particles, adjacency_of(particles), *shapes::sphere({0, 0, 0}, 1.0, 0.1), 0), 0);
 }
 
 /// Particles all over the unit sphere, well spread.
