@@ -24,16 +24,23 @@ void for_each_particle(std::size_t n, const Body& body) {
     });
 }
 
+/// Calls `body` with each neighbour of particle i that faces the same way.
+template <typename Body>
+void for_each_beside(const Particles& particles, const Adjacency& adjacency, std::size_t i,
+                     const Body& body) {
+    for (const int j : adjacency.of(i))
+        if (particles.normal[i].dot(particles.normal[j]) > 0.0) body(j);
+}
+
 void limit_gradation(Particles& particles, const Adjacency& adjacency) {
     std::vector<double> next(particles.size());
     for (int pass = 0; pass < kGradationPasses; ++pass) {
         for_each_particle(particles.size(), [&](std::size_t i) {
             double h = particles.spacing[i];
-            for (const int j : adjacency.of(i)) {
-                if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
+            for_each_beside(particles, adjacency, i, [&](int j) {
                 h = std::min(h, particles.spacing[j] +
                                     kGradation * (particles.position[j] - particles.position[i]).norm());
-            }
+            });
             next[i] = h;
         });
         particles.spacing.swap(next);
@@ -110,11 +117,10 @@ void update_stretch(Particles& particles, const Adjacency& adjacency, double tol
     for_each_particle(particles.size(), [&](std::size_t i) {
         Mat3 sum = curvature[i];
         int count = 1;
-        for (const int j : adjacency.of(i)) {
-            if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
+        for_each_beside(particles, adjacency, i, [&](int j) {
             sum += curvature[j];
             ++count;
-        }
+        });
         // With this curvature a triangle of the wanted spacing has the tolerance for its error.
         const double bent = 6.0 * tolerance / (particles.spacing[i] * particles.spacing[i]);
         particles.stretch[i] = stretch_from(sum / count, particles.normal[i], kCurvatureNoise * bent);
@@ -174,18 +180,17 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
         if (e < 0.0)
             log_k2[i] = -2.0 * std::log(h);
         else
-            log_k2[i] =
-                std::log(std::clamp(e / aim, limits.thinning, 2.0) / (h * actual_spacing(particles, adjacency, i)));
+            log_k2[i] = std::log(std::clamp(e / aim, limits.thinning, 2.0) /
+                                 (h * actual_spacing(particles, adjacency, i)));
     });
     std::vector<double> next(n);
     for_each_particle(n, [&](std::size_t i) {
         double sum = log_k2[i];
         int count = 1;
-        for (const int j : adjacency.of(i)) {
-            if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
+        for_each_beside(particles, adjacency, i, [&](int j) {
             sum += log_k2[j];
             ++count;
-        }
+        });
         // The mean keeps noise out; where the tolerance is missed the particle's own need counts.
         const double mean = sum / count;
         const bool missed = evidence.error[i] > 0.95 * limits.tolerance;
