@@ -16,7 +16,7 @@ constexpr double kFaultReach = 1.5;   // resolutions
 constexpr double kVainSpacing = 0.4;  // resolutions
 constexpr double kLargestCotangent = 2.4751, kLargestFittedCotangent = 3.0777;  // of 22 and 18 degrees
 constexpr double kSmooth =
-    0.7;  // cosine between the normals of a triangle's corners, for its angles to matter
+    0.45;  // cosine between the normals of a triangle's corners, for its angles to matter
 constexpr double kAnglesFrom = 1.0;  // resolutions: longest edge of such a triangle
 
 struct Corners {

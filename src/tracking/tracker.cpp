@@ -11,9 +11,9 @@
 
 #include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/error.h"
+#include "isotrack/meshing/blunting.h"
 #include "isotrack/meshing/convection.h"
 #include "isotrack/meshing/fit.h"
-#include "isotrack/meshing/flips.h"
 #include "isotrack/meshing/manifold.h"
 #include "isotrack/meshing/open_border.h"
 #include "isotrack/meshing/self_intersections.h"
@@ -43,8 +43,8 @@ constexpr double kMostSeeded = 0.05;  // of the particles; with more the next fr
 constexpr int kCertifyRounds = 24;
 constexpr int kFitSteps = 6;
 constexpr double kFitWideExponent = 0.5;
-constexpr int kFlipPasses = 3;
-constexpr double kFlipShare = 0.96;     // of the tolerance, for triangles on another diagonal
+constexpr int kBluntPasses = 8;         // of flips and nudges
+constexpr double kBluntShare = 0.96;    // of the tolerance, for the triangles they change
 constexpr double kAngleFloor = 2.0;     // resolutions: sharp edges are as round as the grid makes them
 constexpr double kLeastSpacing = 5e-4;  // resolutions: a single node inside may leave no more than that
 
@@ -377,34 +377,44 @@ struct Tracker::Impl {
                        least, next_id);
     }
 
-    /// Flips edges of sharp triangles, but for those whose flip makes the mesh miss crossings.
-    static void blunt(FrameMesh& mesh, Inspection& inspection, Inspector& inspector, const Surface& surface,
-                      const SizingLimits& l, std::map<std::string, double>& seconds) {
-        const StageTimer timer(seconds, "flip");
+    /// Makes sharp triangles blunter where the mesh goes on reaching all it reached. The particles stay where
+    /// they are: the next frame's triangles are others.
+    void blunt(FrameMesh& mesh, Inspection& inspection, Inspector& inspector, const Surface& surface,
+               const SizingLimits& l, std::map<std::string, double>& seconds) {
+        const StageTimer timer(seconds, "blunt");
+        auto& points = mesh.vertices;
         auto& triangles = mesh.carved.triangles;
-        for (int pass = 0; pass < kFlipPasses; ++pass) {
-            std::vector<Flip> flips = flip_sharp(mesh.vertices, triangles, surface, kFlipShare * l.tolerance);
-            if (flips.empty()) break;
-            for (const Flip& flip : flips)
-                for (const int t : flip.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
+        std::vector<int> copies(particles.size(), 0);
+        for (const int p : mesh.carved.particle)
+            if (p >= 0) ++copies[p];
+        std::vector<char> movable;
+        for (const int p : mesh.carved.particle) movable.push_back(p >= 0 && copies[p] == 1);
+        for (int pass = 0; pass < kBluntPasses; ++pass) {
+            std::vector<Blunting> changes =
+                blunt_sharp(points, triangles, movable, surface, kBluntShare * l.tolerance);
+            if (changes.empty()) break;
+            for (const Blunting& change : changes)
+                if (change.vertex < 0)
+                    for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
             const std::size_t missed_before = inspection.missed.size();
             const LatticeTopology topology = std::move(inspection.topology);
             for (;;) {
                 inspection = inspector.inspect_both_ways(mesh);
-                if (inspection.missed.size() <= missed_before || flips.empty()) break;
-                const auto at_missed = [&](const Flip& flip) {
+                if (inspection.missed.size() <= missed_before || changes.empty()) break;
+                const auto at_missed = [&](const Blunting& change) {
                     Box box;
-                    for (const int t : flip.triangle)
-                        for (const int v : triangles[t]) box.extend(mesh.vertices[v]);
+                    for (const int t : change.triangle)
+                        for (const int v : triangles[t]) box.extend(points[v]);
                     return std::any_of(
                         inspection.missed.begin(), inspection.missed.end(),
                         [&](const auto& c) { return box.exteriorDistance(c.point) <= l.tolerance; });
                 };
-                const auto kept = std::stable_partition(flips.begin(), flips.end(),
-                                                        [&](const Flip& f) { return !at_missed(f); });
-                const auto from = kept == flips.end() ? flips.begin() : kept;
-                std::for_each(from, flips.end(), [&](const Flip& flip) { undo(flip, triangles); });
-                flips.erase(from, flips.end());
+                const auto kept = std::stable_partition(changes.begin(), changes.end(),
+                                                        [&](const Blunting& c) { return !at_missed(c); });
+                const auto from = kept == changes.end() ? changes.begin() : kept;
+                std::for_each(from, changes.end(),
+                              [&](const Blunting& change) { undo(change, points, triangles, movable); });
+                changes.erase(from, changes.end());
             }
             inspection.topology = topology;
         }
