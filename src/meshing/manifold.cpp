@@ -5,31 +5,33 @@
 #include <algorithm>
 #include <array>
 #include <tuple>
+#include <utility>
+
+#include "meshing/corners.h"
 
 namespace isotrack {
 namespace {
 
-/// The boundary facets of the inside cells, and which one follows which around an edge.
+/// The boundary facets of the inside cells, ascending, and which one follows which around an edge.
 class Boundary {
 public:
-    Boundary(const Tetrahedra& cells, const CellLabels& labels)
-        : cells_(cells), labels_(labels), number_(4 * cells.size(), -1) {
+    Boundary(const Tetrahedra& cells, const CellLabels& labels) : cells_(cells), labels_(labels) {
         for (std::size_t c = 0; c < cells.size(); ++c) {
             if (!labels[c]) continue;
             for (int k = 0; k < 4; ++k)
-                if (!labels[cells.neighbours[c][k]]) {
-                    number_[4 * c + k] = static_cast<int>(facets_.size());
-                    facets_.push_back({static_cast<int>(c), k});
-                }
+                if (!labels[cells.neighbours[c][k]]) facets_.push_back({static_cast<int>(c), k});
         }
     }
     struct Facet {
         int cell, k;
+        bool operator<(const Facet& o) const { return std::tie(cell, k) < std::tie(o.cell, o.k); }
     };
     const std::vector<Facet>& facets() const { return facets_; }
-    int particle(int facet, int corner) const {
-        const Facet& f = facets_[facet];
-        return cells_.vertices[f.cell][Tetrahedra::kFacet[f.k][corner]];
+    Triangle particles(std::size_t facet) const {
+        const auto& [cell, k] = facets_[facet];
+        const auto& v = cells_.vertices[cell];
+        const auto& f = Tetrahedra::kFacet[k];
+        return {v[f[0]], v[f[1]], v[f[2]]};
     }
 
     struct Side {
@@ -41,7 +43,7 @@ public:
         int cross =
             Tetrahedra::kFacet[facets_[facet].k][corner];  // the facet to cross next is opposite this vertex
         int other = facets_[facet].k;                      // the remaining vertex off the edge
-        while (number_[4 * cell + cross] < 0) {
+        while (labels_[cells_.neighbours[cell][cross]]) {
             const int next = cells_.neighbours[cell][cross];
             const int pivot = cells_.vertices[cell][other];
             const int entry = cells_.mirror_index(cell, cross);
@@ -49,14 +51,14 @@ public:
             cross = cells_.index_of(next, pivot);
             other = entry;
         }
+        const auto at = std::lower_bound(facets_.begin(), facets_.end(), Facet{cell, cross});
         const auto& f = Tetrahedra::kFacet[cross];
-        return {number_[4 * cell + cross], f[0] == other ? 0 : f[1] == other ? 1 : 2};
+        return {static_cast<int>(at - facets_.begin()), f[0] == other ? 0 : f[1] == other ? 1 : 2};
     }
 
 private:
     const Tetrahedra& cells_;
     const CellLabels& labels_;
-    std::vector<int> number_;
     std::vector<Facet> facets_;
 };
 
@@ -67,22 +69,26 @@ struct HalfEdge {
     }
 };
 
-/// Sorted: by a counting sort over the vertices they start from, which leaves a handful to sort at each.
-std::vector<HalfEdge> sorted_half_edges(const std::vector<Triangle>& triangles, std::size_t vertices) {
-    std::vector<int> first(vertices + 1, 0);
-    for (const Triangle& t : triangles)
-        for (const int v : t) ++first[v + 1];
-    for (std::size_t v = 0; v < vertices; ++v) first[v + 1] += first[v];
-    std::vector<int> end(first.begin(), first.end() - 1);
-    std::vector<HalfEdge> edges(3 * triangles.size());
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        for (int k = 0; k < 3; ++k) {
-            const int from = triangles[t][(k + 1) % 3], to = triangles[t][(k + 2) % 3];
-            edges[end[from]++] = {from, to, static_cast<int>(t), k};
+/// Whether the triangles at a vertex are a single fan: from each to the next around it they come back to the
+/// first after all, and no edge is met twice.
+bool is_fan(int v, const Corners& corners, const std::vector<Triangle>& triangles) {
+    const int* begin = corners.corner.data() + corners.first[v];
+    const int* end = corners.corner.data() + corners.first[v + 1];
+    const auto beyond = [&](const int* c, int step) { return triangles[*c / 3][(*c % 3 + step) % 3]; };
+    const int start = beyond(begin, 1);
+    int at = start;
+    for (auto left = end - begin; left > 0; --left) {
+        const int* next = nullptr;
+        for (const int* c = begin; c != end; ++c) {
+            if (beyond(c, 1) != at) continue;
+            if (next) return false;
+            next = c;
         }
-    for (std::size_t v = 0; v < vertices; ++v)
-        std::sort(edges.begin() + first[v], edges.begin() + first[v + 1]);
-    return edges;
+        if (!next) return false;
+        at = beyond(next, 2);
+        if (at == start) return left == 1;
+    }
+    return false;
 }
 
 }  // namespace
@@ -91,65 +97,81 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     const Boundary boundary(cells, labels);
     const auto& facets = boundary.facets();
     const std::size_t count = facets.size();
-
-    std::vector<std::array<Boundary::Side, 3>> mates(count);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 512), [&](const auto& range) {
-        for (std::size_t f = range.begin(); f < range.end(); ++f)
-            for (int k = 0; k < 3; ++k) mates[f][k] = boundary.mate(static_cast<int>(f), k);
-    });
-    // Going from mate to mate around a corner comes back to it; the least corner stands for its cycle.
-    std::vector<int> set(3 * count, -1);
-    for (std::size_t c = 0; c < set.size(); ++c)
-        for (int at = static_cast<int>(c); set[at] < 0;) {
-            set[at] = static_cast<int>(c);
-            const Boundary::Side& next = mates[at / 3][(at % 3 + 1) % 3];
-            // Mates run along their edge in opposite directions.
-            at = 3 * next.facet + (next.corner + 1) % 3;
-        }
-
-    // The first corner set at a particle, in the order of the facets, is its own vertex; the others are
-    // copies.
     CarvedSurface result;
-    std::vector<int> first_set(points.size(), -1);
-    std::vector<int> copies;
-    for (std::size_t c = 0; c < 3 * count; ++c) {
-        if (set[c] != static_cast<int>(c)) continue;
-        const int p = boundary.particle(static_cast<int>(c / 3), static_cast<int>(c % 3));
-        if (first_set[p] < 0)
-            first_set[p] = static_cast<int>(c);
-        else
-            copies.push_back(static_cast<int>(c));
+    result.triangles.resize(count);
+    for (std::size_t f = 0; f < count; ++f) {
+        result.triangles[f] = boundary.particles(f);
+        result.inside_cell.push_back(facets[f].cell);
+        result.inside_facet.push_back(facets[f].k);
     }
-    std::vector<int> vertex_of_set(3 * count, -1);
-    for (std::size_t p = 0; p < points.size(); ++p)
-        if (first_set[p] >= 0) {
-            vertex_of_set[first_set[p]] = static_cast<int>(result.particle.size());
-            result.particle.push_back(static_cast<int>(p));
+    const std::vector<Triangle> in_particles = result.triangles;
+    const Corners corners(points.size(), in_particles);
+    std::vector<char> tangled(points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 512), [&](const auto& range) {
+        for (std::size_t p = range.begin(); p < range.end(); ++p)
+            tangled[p] = corners.first[p] < corners.first[p + 1] &&
+                         !is_fan(static_cast<int>(p), corners, in_particles);
+    });
+
+    // Around a particle whose triangles are no single fan, going from mate to mate around a corner comes back
+    // to it: each such cycle is a vertex. The first, in the order of the facets, is its own; the others are
+    // copies.
+    struct Copy {
+        int particle, corner;  // 3 * facet + corner: the first of its cycle
+        std::vector<int> cycle;
+    };
+    std::vector<Copy> copies;
+    for (std::size_t p = 0; p < points.size(); ++p) {
+        if (corners.first[p] < corners.first[p + 1]) result.particle.push_back(static_cast<int>(p));
+        if (!tangled[p]) continue;
+        std::vector<int> left(corners.corner.begin() + corners.first[p],
+                              corners.corner.begin() + corners.first[p + 1]);
+        for (bool own = true; !left.empty(); own = false) {
+            std::vector<int> cycle;
+            int at = left.front();
+            do {
+                cycle.push_back(at);
+                const Boundary::Side next = boundary.mate(at / 3, (at % 3 + 1) % 3);
+                at = 3 * next.facet +
+                     (next.corner + 1) % 3;  // mates run along their edge in opposite directions
+            } while (at != left.front());
+            left.erase(std::remove_if(
+                           left.begin(), left.end(),
+                           [&](int c) { return std::find(cycle.begin(), cycle.end(), c) != cycle.end(); }),
+                       left.end());
+            if (own) continue;
+            const int first = *std::min_element(cycle.begin(), cycle.end());
+            copies.push_back({static_cast<int>(p), first, std::move(cycle)});
         }
-    for (const int c : copies) {
-        const int p = boundary.particle(c / 3, c % 3);
-        vertex_of_set[c] = static_cast<int>(result.particle.size());
-        result.particle.push_back(p);
-        result.pinched.push_back({p, facets[c / 3].cell});
     }
-    std::sort(result.pinched.begin(), result.pinched.end(),
-              [](const auto& a, const auto& b) { return a.particle < b.particle; });
+    std::sort(copies.begin(), copies.end(), [](const Copy& a, const Copy& b) { return a.corner < b.corner; });
+    std::vector<int> vertex_of(points.size(), -1);
+    for (std::size_t v = 0; v < result.particle.size(); ++v)
+        vertex_of[result.particle[v]] = static_cast<int>(v);
+    for (Triangle& t : result.triangles)
+        for (int& v : t) v = vertex_of[v];
+    for (const Copy& copy : copies) {
+        for (const int c : copy.cycle)
+            result.triangles[c / 3][c % 3] = static_cast<int>(result.particle.size());
+        result.particle.push_back(copy.particle);
+        result.pinched.push_back({copy.particle, facets[copy.corner / 3].cell});
+    }
+    std::stable_sort(result.pinched.begin(), result.pinched.end(),
+                     [](const auto& a, const auto& b) { return a.particle < b.particle; });
     result.pinched.erase(std::unique(result.pinched.begin(), result.pinched.end(),
                                      [](const auto& a, const auto& b) { return a.particle == b.particle; }),
                          result.pinched.end());
 
-    result.triangles.resize(count);
-    std::vector<Triangle> in_particles(count);
-    for (std::size_t f = 0; f < count; ++f) {
-        for (int k = 0; k < 3; ++k) {
-            result.triangles[f][k] = vertex_of_set[set[3 * f + k]];
-            in_particles[f][k] = boundary.particle(static_cast<int>(f), k);
+    // An edge that is met twice in one direction is so at both of its ends.
+    std::vector<HalfEdge> raw_edges;
+    for (std::size_t p = 0; p < points.size(); ++p) {
+        if (!tangled[p]) continue;
+        for (int c = corners.first[p]; c < corners.first[p + 1]; ++c) {
+            const int t = corners.corner[c] / 3, k = corners.corner[c] % 3, to = in_particles[t][(k + 1) % 3];
+            if (tangled[to]) raw_edges.push_back({static_cast<int>(p), to, t, (k + 2) % 3});
         }
-        result.inside_cell.push_back(facets[f].cell);
-        result.inside_facet.push_back(facets[f].k);
     }
-
-    const auto raw_edges = sorted_half_edges(in_particles, points.size());
+    std::sort(raw_edges.begin(), raw_edges.end());
     for (std::size_t e = 1; e < raw_edges.size(); ++e) {
         const HalfEdge &a = raw_edges[e - 1], &b = raw_edges[e];
         const bool repeated = a.from == b.from && a.to == b.to;
@@ -158,19 +180,16 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
         result.complex_edges.push_back({a.from, a.to, facets[a.triangle].cell});
     }
 
-    std::vector<char> in_dt(points.size(), 0);
-    for (const auto& cell : cells.vertices)
-        for (const int v : cell)
-            if (v >= 0) in_dt[v] = 1;
-    for (std::size_t p = 0; p < points.size(); ++p)
-        if (in_dt[p] && first_set[p] < 0) result.unused.push_back(static_cast<int>(p));
-
-    // Different edges between the same two output vertices: they get midpoints. `mates` keeps the pairs
-    // apart.
+    // Different edges between the same two output vertices: they get midpoints. Mates keep the pairs apart.
     if (!result.complex_edges.empty()) {
         // Where that happens every edge over the same two particles is split, so that what touches keeps
         // touching in whole edges.
-        const auto edges = sorted_half_edges(result.triangles, result.particle.size());
+        std::vector<HalfEdge> edges;
+        for (const HalfEdge& e : raw_edges) {
+            const Triangle& t = result.triangles[e.triangle];
+            edges.push_back({t[(e.corner + 1) % 3], t[(e.corner + 2) % 3], e.triangle, e.corner});
+        }
+        std::sort(edges.begin(), edges.end());
         std::vector<std::pair<int, int>> ambiguous;
         const auto particles_of = [&](const HalfEdge& e) {
             return std::minmax(result.particle[e.from], result.particle[e.to]);
@@ -181,7 +200,7 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
         std::sort(ambiguous.begin(), ambiguous.end());
         std::vector<std::array<int, 2>> to_split;  // triangle, corner; each pair of mates once
         for (const HalfEdge& e : edges)
-            if (e.triangle < mates[e.triangle][e.corner].facet &&
+            if (e.triangle < boundary.mate(e.triangle, e.corner).facet &&
                 std::binary_search(ambiguous.begin(), ambiguous.end(), std::pair<int, int>(particles_of(e))))
                 to_split.push_back({e.triangle, e.corner});
         std::vector<std::array<int, 3>> midpoint(count, {-1, -1, -1});
@@ -191,7 +210,8 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
             result.midpoints.push_back(0.5 * (points[result.particle[a]] + points[result.particle[b]]));
             result.particle.push_back(-1);
             midpoint[t][k] = m;
-            midpoint[mates[t][k].facet][mates[t][k].corner] = m;
+            const Boundary::Side mate = boundary.mate(t, k);
+            midpoint[mate.facet][mate.corner] = m;
         }
         for (std::size_t f = 0; f < count; ++f) {
             // A triangle with midpoints on its edges, as a polygon, fanned from a midpoint: no two halves

@@ -188,20 +188,18 @@ TEST(PureConvection, LeavesVoidsFilled) {
     const auto carved = carve(s.cells, pure_convection(s.cells, s.particles.position), s.particles.position);
     expect_solid(mesh_of(carved, s.particles.position), 1, 2);
     // The particles of the inner sphere are on no boundary facet, those of the outer one are.
-    for (const int p : carved.unused) EXPECT_LT(s.particles.position[p].norm(), 0.85);
-    const auto inner = std::count_if(s.particles.position.begin(), s.particles.position.end(),
-                                     [](const Vec3& p) { return p.norm() < 0.85; });
-    EXPECT_EQ(static_cast<std::ptrdiff_t>(carved.unused.size()), inner);
+    for (const int p : carved.particle) EXPECT_GT(s.particles.position[p].norm(), 0.85);
+    const auto outer = std::count_if(s.particles.position.begin(), s.particles.position.end(),
+                                     [](const Vec3& p) { return p.norm() > 0.85; });
+    EXPECT_EQ(static_cast<std::ptrdiff_t>(carved.particle.size()), outer);
 }
 
-/// What carve says of complex edges, pinched and unused particles, counted on the cells themselves. Empty
-/// when right.
+/// What carve says of complex edges and of its particles, counted on the cells themselves. Empty when right.
 std::string wrong_count(const Tetrahedra& cells, const CellLabels& labels, const CarvedSurface& carved) {
     std::map<std::pair<int, int>, int> facets_at_edge;
-    std::set<int> in_dt, on_boundary;
+    std::set<int> on_boundary;
     for (std::size_t c = 0; c < cells.size(); ++c)
         for (int k = 0; k < 4; ++k) {
-            if (cells.vertices[c][k] >= 0) in_dt.insert(cells.vertices[c][k]);
             if (!labels[c] || labels[cells.neighbours[c][k]]) continue;
             int v[3];
             for (int i = 0; i < 3; ++i) v[i] = cells.vertices[c][Tetrahedra::kFacet[k][i]];
@@ -222,13 +220,12 @@ std::string wrong_count(const Tetrahedra& cells, const CellLabels& labels, const
         if (!holds(e.cell, e.from) || !holds(e.cell, e.to)) return "a complex edge's cell";
     }
     if (said != complex || carved.complex_edges.size() != complex.size()) return "complex edges";
-    std::vector<int> unused;
-    std::set_difference(in_dt.begin(), in_dt.end(), on_boundary.begin(), on_boundary.end(),
-                        std::back_inserter(unused));
-    if (carved.unused != unused) return "unused particles";
     std::map<int, int> copies;
     for (const int p : carved.particle)
         if (p >= 0) ++copies[p];
+    std::set<int> used;
+    for (const auto& entry : copies) used.insert(entry.first);
+    if (used != on_boundary) return "particles";
     std::vector<int> pinched;
     for (const auto& [p, count] : copies)
         if (count > 1) pinched.push_back(p);

@@ -30,7 +30,6 @@ struct CarvedSurface {
         int particle, cell;  ///< An inside cell that has it.
     };
     std::vector<Pinch> pinched;  ///< Particles that needed more than one output vertex, ascending.
-    std::vector<int> unused;     ///< Particles of the DT on no boundary facet.
 };
 
 /// Every half-edge is mated with the one found by rotating through inside cells, so solids that touch stay
