@@ -1,6 +1,7 @@
 #include "meshing/blunting.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "isotrack/meshing/certify.h"
 #include "isotrack/meshing/self_intersections.h"
@@ -12,7 +13,6 @@ namespace {
 constexpr double kSharp = 1.7320508075688772;  // cotangent of 30 degrees
 constexpr double kFacing = 0.5;                // cosine to the surface normal, at least
 constexpr int kSteps = 6;                      // barycentric lattice of the error samples
-
 
 Box box_of(const std::vector<Vec3>& points, const Triangle& t) {
     Box box(points[t[0]]);
@@ -56,38 +56,6 @@ std::vector<char> crossing_ones(const std::vector<Blunting>& changes, const std:
     return crossing;
 }
 
-/// The sharp triangles, sharpest first: cotangent and number.
-std::vector<std::pair<double, int>> sharp_triangles(const std::vector<Vec3>& points,
-                                                    const std::vector<Triangle>& triangles) {
-    std::vector<std::pair<double, int>> result;
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-        const auto& [i, j, k] = triangles[t];
-        if (const double s = sharpness(points[i], points[j], points[k]); s > kSharp)
-            result.emplace_back(-s, static_cast<int>(t));
-    }
-    std::sort(result.begin(), result.end());
-    for (auto& entry : result) entry.first = -entry.first;
-    return result;
-}
-
-/// Takes back what crosses other triangles.
-void undo_crossing(std::vector<Blunting>& changes, std::vector<Vec3>& points,
-                   std::vector<Triangle>& triangles, std::vector<char>& movable) {
-    while (!changes.empty()) {
-        const std::vector<char> crossing = crossing_ones(changes, points, triangles);
-        std::vector<Blunting> kept;
-        for (std::size_t c = 0; c < changes.size(); ++c) {
-            if (crossing[c])
-                undo(changes[c], points, triangles, movable);
-            else
-                kept.push_back(std::move(changes[c]));
-        }
-        const bool done = kept.size() == changes.size();
-        changes = std::move(kept);
-        if (done) break;
-    }
-}
-
 }  // namespace
 
 double BluntedMesh::sharpness_of(const Triangle& t) const {
@@ -98,49 +66,84 @@ double BluntedMesh::facing(const std::vector<Triangle>& some) const {
     double least = 1.0;
     for (const Triangle& t : some) {
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-        least = std::min(least,
-                         (b - a).cross(c - a).normalized().dot(probe.normal((a + b + c) / 3.0)));
+        least = std::min(least, (b - a).cross(c - a).normalized().dot(probe.normal((a + b + c) / 3.0)));
     }
     return least;
 }
 
 bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, double facing_before) const {
     if (!(facing(candidates) > std::min(kFacing, facing_before))) return false;
-    const auto errors = triangle_errors(points, candidates, surface, kSteps, 0.5 * tolerance);
-    return std::all_of(errors.begin(), errors.end(),
-                       [&](const TriangleError& e) { return e.largest <= tolerance; });
+    return std::all_of(candidates.begin(), candidates.end(), [&](const Triangle& t) {
+        return triangle_error(points[t[0]], points[t[1]], points[t[2]], probe, kSteps, 0.5 * tolerance)
+                   .largest <= tolerance;
+    });
 }
 
-std::vector<Blunting> blunt_sharp(std::vector<Vec3>& points, std::vector<Triangle>& triangles,
-                                  std::vector<char>& movable, const Surface& surface,
-                                  double tolerance) {
-    std::vector<Blunting> changes;
-    const auto sharp = sharp_triangles(points, triangles);
-    if (sharp.empty()) return changes;
-    const auto probe = surface.probe();
-    BluntedMesh mesh{points,
-                     triangles,
-                     Corners(points.size(), triangles),
-                     std::vector<char>(points.size(), 0),
-                     movable,
-                     surface,
-                     tolerance,
-                     *probe};
-    for (const auto& [sharpness, t] : sharp) {
-        auto change = flip(mesh, t, sharpness);
-        if (!change) change = nudge(mesh, t);
-        if (change) changes.push_back(std::move(*change));
+Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
+                 const Surface& surface, double tolerance)
+    : points_(points),
+      triangles_(triangles),
+      movable_(std::move(movable)),
+      surface_(surface),
+      tolerance_(tolerance),
+      open_(points.size(), 1) {}
+
+std::vector<Blunting> Blunter::pass() {
+    std::vector<std::pair<double, int>> sharp;
+    for (std::size_t t = 0; t < triangles_.size(); ++t) {
+        const auto& [i, j, k] = triangles_[t];
+        if (!open_[i] && !open_[j] && !open_[k]) continue;
+        if (const double s = sharpness(points_[i], points_[j], points_[k]); s > kSharp)
+            sharp.emplace_back(-s, static_cast<int>(t));
     }
-    undo_crossing(changes, points, triangles, movable);
+    open_.assign(points_.size(), 0);
+    std::vector<Blunting> changes;
+    if (sharp.empty()) return changes;
+    std::sort(sharp.begin(), sharp.end());
+    const auto probe = surface_.probe();
+    BluntedMesh mesh{points_,    triangles_, Corners(points_.size(), triangles_), movable_,
+                     tolerance_, *probe,     std::vector<char>(points_.size(), 0)};
+    for (const auto& [sharpest, t] : sharp) {
+        for (const int v : triangles_[t])
+            if (mesh.touched[v]) open_[v] = 1;
+        auto change = flip(mesh, t, -sharpest);
+        if (!change) change = nudge(mesh, t);
+        if (!change) continue;
+        changes.push_back(std::move(*change));
+        reopen(changes.back());
+    }
+    undo_crossing(changes);
     return changes;
 }
 
-void undo(const Blunting& change, std::vector<Vec3>& points, std::vector<Triangle>& triangles,
-          std::vector<char>& movable) {
-    for (std::size_t i = 0; i < change.triangle.size(); ++i) triangles[change.triangle[i]] = change.before[i];
+void Blunter::undo(const Blunting& change) {
+    for (std::size_t i = 0; i < change.triangle.size(); ++i)
+        triangles_[change.triangle[i]] = change.before[i];
+    reopen(change);
     if (change.vertex < 0) return;
-    points[change.vertex] = change.from;
-    movable[change.vertex] = 0;
+    points_[change.vertex] = change.from;
+    movable_[change.vertex] = 0;
+}
+
+void Blunter::reopen(const Blunting& change) {
+    for (const int t : change.triangle)
+        for (const int v : triangles_[t]) open_[v] = 1;
+}
+
+void Blunter::undo_crossing(std::vector<Blunting>& changes) {
+    while (!changes.empty()) {
+        const std::vector<char> crossing = crossing_ones(changes, points_, triangles_);
+        std::vector<Blunting> kept;
+        for (std::size_t c = 0; c < changes.size(); ++c) {
+            if (crossing[c])
+                undo(changes[c]);
+            else
+                kept.push_back(std::move(changes[c]));
+        }
+        const bool done = kept.size() == changes.size();
+        changes = std::move(kept);
+        if (done) break;
+    }
 }
 
 }  // namespace isotrack

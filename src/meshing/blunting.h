@@ -9,22 +9,21 @@
 
 namespace isotrack {
 
-/// A mesh in the course of being changed.
+/// A mesh in the course of a pass.
 struct BluntedMesh {
     std::vector<Vec3>& points;
     std::vector<Triangle>& triangles;
-    const Corners corners;      ///< Of the start; still right around what is untouched.
-    std::vector<char> touched;  ///< Per vertex: a change is near.
-    std::vector<char>& movable;
-    const Surface& surface;
+    const Corners corners;  ///< Of the start; still right around what is untouched.
+    const std::vector<char>& movable;
     double tolerance;
     Surface::Probe& probe;
+    std::vector<char> touched;  ///< Per vertex: a change is near.
 
     double sharpness_of(const Triangle& t) const;
     /// The least cosine between their normals and the surface's.
     double facing(const std::vector<Triangle>& some) const;
-    /// Whether all these triangles face the way the surface does, or more so than those they stand for, and are
-    /// within the tolerance of it.
+    /// Whether all these triangles face the way the surface does, or no worse than those they stand for, and
+    /// are within the tolerance of it.
     bool may_have(const std::vector<Triangle>& candidates, double facing_before) const;
 };
 

@@ -63,6 +63,29 @@ void climb(Surface::Probe& probe, const Vec3& a, const Vec3& ab, const Vec3& ac,
 
 }  // namespace
 
+TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
+                             double refine_above) {
+    TriangleError error;
+    int count = 0;
+    double best_u = 0.0, best_v = 0.0;
+    for (int i = 0; i <= steps; ++i)
+        for (int j = 0; i + j <= steps; ++j) {
+            const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
+            const double value = std::abs(probe.value(a + u * (b - a) + v * (c - a)));
+            error.mean_square += value * value;
+            ++count;
+            if (value <= error.largest) continue;
+            error.largest = value;
+            best_u = u;
+            best_v = v;
+        }
+    if (error.largest > refine_above)
+        climb(probe, a, b - a, c - a, 0.5 / steps, best_u, best_v, error.largest);
+    error.where = a + best_u * (b - a) + best_v * (c - a);
+    error.mean_square /= count;
+    return error;
+}
+
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps, double refine_above) {
@@ -71,26 +94,8 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
         Surface::Probe& probe = probes.local();
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
-            const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
-                       &c = points[triangles[t][2]];
-            TriangleError& error = errors[t];
-            int count = 0;
-            double best_u = 0.0, best_v = 0.0;
-            for (int i = 0; i <= steps; ++i)
-                for (int j = 0; i + j <= steps; ++j) {
-                    const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
-                    const double value = std::abs(probe.value(a + u * (b - a) + v * (c - a)));
-                    error.mean_square += value * value;
-                    ++count;
-                    if (value <= error.largest) continue;
-                    error.largest = value;
-                    best_u = u;
-                    best_v = v;
-                }
-            if (error.largest > refine_above)
-                climb(probe, a, b - a, c - a, 0.5 / steps, best_u, best_v, error.largest);
-            error.where = a + best_u * (b - a) + best_v * (c - a);
-            error.mean_square /= count;
+            const auto& [i, j, k] = triangles[t];
+            errors[t] = triangle_error(points[i], points[j], points[k], probe, steps, refine_above);
         }
     });
     return errors;
@@ -156,31 +161,50 @@ private:
 
 }  // namespace
 
+double FacingTriangle::squared_distance(const Surface::Crossing& crossing, double limit) const {
+    constexpr double kInfinite = std::numeric_limits<double>::infinity();
+    const double off_plane = normal_.dot(crossing.point - a_);
+    if (off_plane * off_plane > limit || normal_.dot(crossing.outward.cast<double>()) < kFacing)
+        return kInfinite;
+    return isotrack::squared_distance(crossing.point, a_, b_, c_);
+}
+
 void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                         const CrossingGrid& grid, double cutoff, std::vector<double>& distances) {
     const std::vector<Surface::Crossing>& crossings = grid.crossings();
-    std::vector<LeastSquare> least(crossings.size());
     std::vector<char> wanted(crossings.size());
     for (std::size_t i = 0; i < crossings.size(); ++i) wanted[i] = distances[i] == kUnknownDistance;
+    if (std::find(wanted.begin(), wanted.end(), 1) == wanted.end()) return;
+    std::vector<LeastSquare> least(crossings.size());
+    const auto for_each_block = [](std::size_t count, const auto& body) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 64), [&](const auto& range) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
+        });
+    };
+    const auto box_around = [&](const Triangle& t, double reach) {
+        const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+        return Box((a.cwiseMin(b).cwiseMin(c).array() - reach).matrix(),
+                   (a.cwiseMax(b).cwiseMax(c).array() + reach).matrix());
+    };
+    // Most triangles are far from all that is wanted when little is.
+    std::vector<char> columns = grid.columns_of(wanted);
+    std::vector<char> is_near(triangles.size());
+    for_each_block(triangles.size(), [&](std::size_t t) {
+        is_near[t] = grid.meets(box_around(triangles[t], cutoff), columns);
+    });
+    std::vector<Triangle> near;
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        if (is_near[t]) near.push_back(triangles[t]);
     const auto search = [&](double reach) {
-        const std::vector<char> columns = grid.columns_of(wanted);
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
-            for (std::size_t t = range.begin(); t < range.end(); ++t) {
-                const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
-                           &c = points[triangles[t][2]];
-                const Vec3 normal = (b - a).cross(c - a).normalized();
-                Box box(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c));
-                box.min().array() -= reach;
-                box.max().array() += reach;
-                const auto measure = [&](std::size_t i) {
-                    if (!wanted[i]) return;
-                    const double off_plane = normal.dot(crossings[i].point - a);
-                    if (off_plane * off_plane > std::min(reach * reach, least[i].get())) return;
-                    if (normal.dot(crossings[i].outward.cast<double>()) < kFacing) return;
-                    least[i].take(squared_distance(crossings[i].point, a, b, c));
-                };
-                grid.for_each_in(box, measure, &columns);
-            }
+        for_each_block(near.size(), [&](std::size_t t) {
+            const auto& [i, j, k] = near[t];
+            const FacingTriangle triangle(points[i], points[j], points[k]);
+            const auto measure = [&](std::size_t c) {
+                if (wanted[c])
+                    least[c].take(
+                        triangle.squared_distance(crossings[c], std::min(reach * reach, least[c].get())));
+            };
+            grid.for_each_in(box_around(near[t], reach), measure, &columns);
         });
         bool any = false;
         for (std::size_t i = 0; i < crossings.size(); ++i) {
@@ -191,7 +215,10 @@ void crossing_distances(const std::vector<Vec3>& points, const std::vector<Trian
     };
     // Most are near.
     constexpr double kNear = 0.4;
-    if (std::find(wanted.begin(), wanted.end(), 1) != wanted.end() && search(kNear * cutoff)) search(cutoff);
+    if (search(kNear * cutoff)) {
+        columns = grid.columns_of(wanted);
+        search(cutoff);
+    }
     for (std::size_t i = 0; i < crossings.size(); ++i)
         if (distances[i] == kUnknownDistance)
             distances[i] = wanted[i] ? std::numeric_limits<double>::infinity() : std::sqrt(least[i].get());

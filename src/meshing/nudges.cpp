@@ -7,6 +7,7 @@
 #include "meshing/blunting.h"
 #include "meshing/corners.h"
 #include "meshing/sharpness.h"
+#include "surface/float_precision.h"
 
 namespace isotrack {
 namespace {
@@ -90,8 +91,7 @@ std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle) {
         for (int halving = 0; halving <= kHalvings; ++halving, way *= 0.5) {
             const auto on_surface = mesh.probe.project(from + way);
             if (!on_surface) continue;
-            const Vec3 to =
-                (*on_surface + height * mesh.probe.normal(*on_surface)).cast<float>().cast<double>();
+            const Vec3 to = to_float_precision(*on_surface + height * mesh.probe.normal(*on_surface));
             if (!(star.sharpness_at(to) < kBluntGain * before)) continue;
             points[v] = to;
             if (mesh.may_have(around, facing)) {

@@ -95,17 +95,34 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
         distances_.assign(crossings.size(), kUnknownDistance);
     } else {
         for (std::size_t c = 0; c < crossings.size(); ++c) missed_before[c] = is_missed(distances_[c]);
-        // Those near triangles that came or went are to be measured again.
-        const auto forget = [&](const Facet& facet) {
+        // What was nearest to a triangle that went is to be measured again; what is nearer to one that came
+        // than to all before is measured now.
+        const double same = 1e-6 * cutoff;  // rounding
+        const auto for_each_near = [&](const Facet& facet, const auto& body) {
             const auto& [a, b, c] = facet.corner;
             const Vec3 reach = Vec3::Constant(cutoff), low = a.cwiseMin(b).cwiseMin(c).cast<double>(),
                        high = a.cwiseMax(b).cwiseMax(c).cast<double>();
-            crossings_.for_each_in(Box(low - reach, high + reach),
-                                   [&](std::size_t i) { distances_[i] = kUnknownDistance; });
+            const FacingTriangle triangle(a.cast<double>(), b.cast<double>(), c.cast<double>());
+            crossings_.for_each_in(Box(low - reach, high + reach), [&](std::size_t i) {
+                if (distances_[i] != kUnknownDistance) body(triangle, i);
+            });
         };
+        std::vector<std::size_t> came;
         compare(
-            facets_, reached_, [](std::size_t, std::size_t) {}, [&](std::size_t f) { forget(facets_[f]); },
-            [&](std::size_t f) { forget(reached_[f]); });
+            facets_, reached_, [](std::size_t, std::size_t) {}, [&](std::size_t f) { came.push_back(f); },
+            [&](std::size_t f) {
+                for_each_near(reached_[f], [&](const FacingTriangle& triangle, std::size_t i) {
+                    const double d = distances_[i] + same;
+                    if (triangle.squared_distance(crossings[i], d * d) <= d * d)
+                        distances_[i] = kUnknownDistance;
+                });
+            });
+        for (const std::size_t f : came)
+            for_each_near(facets_[f], [&](const FacingTriangle& triangle, std::size_t i) {
+                const double limit = std::min(distances_[i], cutoff),
+                             d2 = triangle.squared_distance(crossings[i], limit * limit);
+                if (d2 < limit * limit) distances_[i] = std::sqrt(d2);
+            });
     }
     crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff, distances_);
     reached_ = facets_;

@@ -25,6 +25,7 @@
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
 #include "sampling/compact.h"
+#include "surface/float_precision.h"
 #include "surface/thread_probes.h"
 #include "tracking/inspection.h"
 
@@ -130,9 +131,8 @@ struct Fitted {
     }
 };
 
-/// Files hold floats: what is certified must be what is written.
 void round_to_float(Particles& particles) {
-    for (Vec3& p : particles.position) p = p.cast<float>().cast<double>();
+    for (Vec3& p : particles.position) p = to_float_precision(p);
 }
 
 }  // namespace
@@ -284,9 +284,8 @@ struct Tracker::Impl {
             mesh.carved = carve(cells, labels, particles.position);
         std::size_t midpoint = 0;
         for (const int p : mesh.carved.particle)
-            mesh.vertices.push_back(
-                p >= 0 ? particles.position[p]
-                       : Vec3(mesh.carved.midpoints[midpoint++].cast<float>().cast<double>()));
+            mesh.vertices.push_back(p >= 0 ? particles.position[p]
+                                           : to_float_precision(mesh.carved.midpoints[midpoint++]));
         mesh.on_surface = mesh.vertices;
         return mesh;
     }
@@ -320,7 +319,7 @@ struct Tracker::Impl {
                     for (const int v : t) movable[v] = 1;
         }
         fit(mesh.vertices, triangles, surface, kFitSteps, movable);
-        for (Vec3& v : mesh.vertices) v = v.cast<float>().cast<double>();
+        for (Vec3& v : mesh.vertices) v = to_float_precision(v);
         fitted.facets = std::move(facets);
         fitted.take(mesh, particles.size());
     }
@@ -389,18 +388,17 @@ struct Tracker::Impl {
             if (p >= 0) ++copies[p];
         std::vector<char> movable;
         for (const int p : mesh.carved.particle) movable.push_back(p >= 0 && copies[p] == 1);
+        Blunter blunter(points, triangles, std::move(movable), surface, kBluntShare * l.tolerance);
+        const std::size_t missed_before = inspection.missed.size();
+        const LatticeTopology topology = std::move(inspection.topology);
+        const auto inspect = [&] { inspection = inspector.inspect_both_ways(mesh); };
         for (int pass = 0; pass < kBluntPasses; ++pass) {
-            std::vector<Blunting> changes =
-                blunt_sharp(points, triangles, movable, surface, kBluntShare * l.tolerance);
+            std::vector<Blunting> changes = blunter.pass();
             if (changes.empty()) break;
             for (const Blunting& change : changes)
                 if (change.vertex < 0)
                     for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
-            const std::size_t missed_before = inspection.missed.size();
-            const LatticeTopology topology = std::move(inspection.topology);
-            for (;;) {
-                inspection = inspector.inspect_both_ways(mesh);
-                if (inspection.missed.size() <= missed_before || changes.empty()) break;
+            for (inspect(); inspection.missed.size() > missed_before && !changes.empty(); inspect()) {
                 const auto at_missed = [&](const Blunting& change) {
                     Box box;
                     for (const int t : change.triangle)
@@ -412,12 +410,11 @@ struct Tracker::Impl {
                 const auto kept = std::stable_partition(changes.begin(), changes.end(),
                                                         [&](const Blunting& c) { return !at_missed(c); });
                 const auto from = kept == changes.end() ? changes.begin() : kept;
-                std::for_each(from, changes.end(),
-                              [&](const Blunting& change) { undo(change, points, triangles, movable); });
+                std::for_each(from, changes.end(), [&](const Blunting& change) { blunter.undo(change); });
                 changes.erase(from, changes.end());
             }
-            inspection.topology = topology;
         }
+        inspection.topology = topology;
     }
 
     /// The newborn move like the neighbours that were there before; alone among newborn they rest.

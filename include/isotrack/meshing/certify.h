@@ -18,10 +18,13 @@ struct TriangleError {
     Vec3 where = Vec3::Zero();  ///< The sample point with the largest.
 };
 
-/// Errors of each triangle at the points of a regular barycentric lattice with `steps` intervals per edge (>=
-/// 1): (steps+1)(steps+2)/2 points. Uses TBB inside; the result does not depend on the number of threads.
-/// Where the largest of them is above `refine_above` the error is followed uphill between the points; the
-/// mean is that of the points.
+/// The error of triangle abc at the points of a regular barycentric lattice with `steps` intervals per edge
+/// (>= 1): (steps+1)(steps+2)/2 points. Where the largest of them is above `refine_above` the error is
+/// followed uphill between the points; the mean is that of the points.
+TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
+                             double refine_above = std::numeric_limits<double>::infinity());
+
+/// That of each triangle. Uses TBB inside; the result does not depend on the number of threads.
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps,
@@ -35,10 +38,23 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
 std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell,
                                   int facet, Surface::Probe& probe);
 
-/// Distance of every lattice crossing of the surface to the nearest triangle that faces its way (unit normal
-/// . outward >= -0.2, since a crossed edge may lie nearly in the surface), so that one side of a thin sheet
-/// does not stand for the other. In the order of `grid`, world units. Exact up to `cutoff`; beyond it
-/// the entry is infinite.
+/// A triangle as lattice crossings see it: it stands for those that leave the inside the way it faces (unit
+/// normal . outward >= -0.2, since a crossed edge may lie nearly in the surface), so that one side of a thin
+/// sheet does not stand for the other.
+class FacingTriangle {
+public:
+    FacingTriangle(const Vec3& a, const Vec3& b, const Vec3& c)
+        : a_(a), b_(b), c_(c), normal_((b - a).cross(c - a).normalized()) {}
+    /// Squared distance to a crossing; infinite when the triangle faces another way, and perhaps when it is
+    /// above `limit`.
+    double squared_distance(const Surface::Crossing& crossing, double limit) const;
+
+private:
+    Vec3 a_, b_, c_, normal_;
+};
+
+/// Distance of every lattice crossing of the surface to the nearest triangle that stands for it. In the order
+/// of `grid`, world units. Exact up to `cutoff`; beyond it the entry is infinite.
 std::vector<double> crossing_distances(const std::vector<Vec3>& points,
                                        const std::vector<Triangle>& triangles, const CrossingGrid& grid,
                                        double cutoff);

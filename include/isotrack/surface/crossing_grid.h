@@ -45,6 +45,16 @@ public:
             }
     }
 
+    /// Whether the box is over a column that is set.
+    bool meets(const Box& box, const std::vector<char>& columns) const {
+        if (crossings_.empty()) return false;
+        const int to = column(1, box.max()[1]);
+        for (int x = column(0, box.min()[0]); x <= column(0, box.max()[0]); ++x)
+            for (int y = column(1, box.min()[1]); y <= to; ++y)
+                if (columns[static_cast<std::size_t>(x) * count_[1] + y]) return true;
+        return false;
+    }
+
     /// Flags per column: it holds a crossing that is wanted. `wanted`: a flag per crossing.
     std::vector<char> columns_of(const std::vector<char>& wanted) const;
 
