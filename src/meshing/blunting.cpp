@@ -6,6 +6,7 @@
 #include "isotrack/meshing/certify.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "meshing/sharpness.h"
+#include "sampling/compact.h"
 
 namespace isotrack {
 namespace {
@@ -21,17 +22,17 @@ Box box_of(const std::vector<Vec3>& points, const Triangle& t) {
     return box;
 }
 
-/// The changes of which a triangle crosses another.
-std::vector<char> crossing_ones(const std::vector<Blunting>& changes, const std::vector<Vec3>& points,
-                                const std::vector<Triangle>& triangles) {
-    // Only what is in the box of a changed triangle can cross it.
+/// Flags for the triangles that cross others; at least one of each pair is `fresh`.
+std::vector<char> crossing_triangles(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                     const std::vector<char>& fresh) {
+    // Only what is in the box of a fresh triangle can cross it.
     std::vector<Box> places;
     double widest = 0.0;
-    for (const Blunting& change : changes)
-        for (const int t : change.triangle) {
-            places.push_back(box_of(points, triangles[t]));
-            widest = std::max(widest, places.back().sizes().x());
-        }
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        if (!fresh[t]) continue;
+        places.push_back(box_of(points, triangles[t]));
+        widest = std::max(widest, places.back().sizes().x());
+    }
     std::sort(places.begin(), places.end(),
               [](const Box& a, const Box& b) { return a.min().x() < b.min().x(); });
     TriangleMesh near;
@@ -46,13 +47,9 @@ std::vector<char> crossing_ones(const std::vector<Blunting>& changes, const std:
         near.triangles.push_back(triangles[t]);
         of.push_back(t);
     }
-    std::vector<int> change_of(triangles.size(), -1);
-    for (std::size_t c = 0; c < changes.size(); ++c)
-        for (const int t : changes[c].triangle) change_of[t] = static_cast<int>(c);
-    std::vector<char> crossing(changes.size(), 0);
+    std::vector<char> crossing(triangles.size(), 0);
     for (const auto& pair : self_intersections(near))
-        for (const int t : {pair.first, pair.second})
-            if (const int c = change_of[of[t]]; c >= 0) crossing[c] = 1;
+        for (const int t : {pair.first, pair.second}) crossing[of[t]] = 1;
     return crossing;
 }
 
@@ -86,9 +83,19 @@ Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, st
       movable_(std::move(movable)),
       surface_(surface),
       tolerance_(tolerance),
-      open_(points.size(), 1) {}
+      open_(points.size(), 1),
+      unchecked_(triangles.size(), 0) {}
 
-std::vector<Blunting> Blunter::pass() {
+bool Blunter::run(int passes) {
+    const std::size_t before = changes_.size();
+    for (int p = 0; p < passes && pass(); ++p) {
+    }
+    if (changes_.size() == before) return false;
+    undo_crossing();
+    return true;
+}
+
+bool Blunter::pass() {
     std::vector<std::pair<double, int>> sharp;
     for (std::size_t t = 0; t < triangles_.size(); ++t) {
         const auto& [i, j, k] = triangles_[t];
@@ -97,9 +104,9 @@ std::vector<Blunting> Blunter::pass() {
             sharp.emplace_back(-s, static_cast<int>(t));
     }
     open_.assign(points_.size(), 0);
-    std::vector<Blunting> changes;
-    if (sharp.empty()) return changes;
+    if (sharp.empty()) return false;
     std::sort(sharp.begin(), sharp.end());
+    const std::size_t before = changes_.size();
     const auto probe = surface_.probe();
     BluntedMesh mesh{points_,    triangles_, Corners(points_.size(), triangles_), movable_,
                      tolerance_, *probe,     std::vector<char>(points_.size(), 0)};
@@ -109,40 +116,68 @@ std::vector<Blunting> Blunter::pass() {
         auto change = flip(mesh, t, -sharpest);
         if (!change) change = nudge(mesh, t);
         if (!change) continue;
-        changes.push_back(std::move(*change));
-        reopen(changes.back());
-    }
-    undo_crossing(changes);
-    return changes;
-}
-
-void Blunter::undo(const Blunting& change) {
-    for (std::size_t i = 0; i < change.triangle.size(); ++i)
-        triangles_[change.triangle[i]] = change.before[i];
-    reopen(change);
-    if (change.vertex < 0) return;
-    points_[change.vertex] = change.from;
-    movable_[change.vertex] = 0;
-}
-
-void Blunter::reopen(const Blunting& change) {
-    for (const int t : change.triangle)
-        for (const int v : triangles_[t]) open_[v] = 1;
-}
-
-void Blunter::undo_crossing(std::vector<Blunting>& changes) {
-    while (!changes.empty()) {
-        const std::vector<char> crossing = crossing_ones(changes, points_, triangles_);
-        std::vector<Blunting> kept;
-        for (std::size_t c = 0; c < changes.size(); ++c) {
-            if (crossing[c])
-                undo(changes[c]);
-            else
-                kept.push_back(std::move(changes[c]));
+        for (const int changed : change->triangle) {
+            unchecked_[changed] = 1;
+            for (const int v : triangles_[changed]) open_[v] = 1;
         }
-        const bool done = kept.size() == changes.size();
-        changes = std::move(kept);
-        if (done) break;
+        changes_.push_back(std::move(*change));
+    }
+    return changes_.size() > before;
+}
+
+bool Blunter::undo_near(const std::vector<Vec3>& places, double distance) {
+    if (changes_.empty()) return false;
+    std::vector<char> marked(changes_.size(), 0);
+    for (std::size_t c = 0; c < changes_.size(); ++c) {
+        Box box;
+        for (const int t : changes_[c].triangle)
+            for (const int v : triangles_[t]) box.extend(points_[v]);
+        marked[c] = std::any_of(places.begin(), places.end(),
+                                [&](const Vec3& p) { return box.exteriorDistance(p) <= distance; });
+    }
+    if (std::find(marked.begin(), marked.end(), 1) == marked.end()) marked.assign(changes_.size(), 1);
+    undo(marked);
+    undo_crossing();
+    return true;
+}
+
+/// Takes back those that are marked, and later ones that concern the same triangles.
+void Blunter::undo(const std::vector<char>& marked) {
+    std::vector<char> back(triangles_.size(), 0), taken = marked;
+    for (std::size_t c = 0; c < changes_.size(); ++c) {
+        const auto& concerned = changes_[c].triangle;
+        taken[c] =
+            taken[c] || std::any_of(concerned.begin(), concerned.end(), [&](int t) { return back[t]; });
+        if (taken[c])
+            for (const int t : concerned) back[t] = 1;
+    }
+    for (std::size_t c = changes_.size(); c-- > 0;) {
+        if (!taken[c]) continue;
+        const Blunting& change = changes_[c];
+        for (std::size_t i = 0; i < change.triangle.size(); ++i) {
+            triangles_[change.triangle[i]] = change.before[i];
+            unchecked_[change.triangle[i]] = 1;
+        }
+        for (const Triangle& t : change.before)
+            for (const int v : t) open_[v] = 1;
+        if (change.vertex < 0) continue;
+        points_[change.vertex] = change.from;
+        if (marked[c]) movable_[change.vertex] = 0;
+    }
+    for (char& flag : taken) flag = !flag;
+    compact(changes_, taken);
+}
+
+void Blunter::undo_crossing() {
+    for (;;) {
+        const std::vector<char> crossing = crossing_triangles(points_, triangles_, unchecked_);
+        unchecked_.assign(triangles_.size(), 0);
+        std::vector<char> marked;
+        for (const Blunting& change : changes_)
+            marked.push_back(std::any_of(change.triangle.begin(), change.triangle.end(),
+                                         [&](int t) { return crossing[t]; }));
+        if (std::find(marked.begin(), marked.end(), 1) == marked.end()) return;
+        undo(marked);
     }
 }
 

@@ -44,7 +44,7 @@ constexpr double kMostSeeded = 0.05;  // of the particles; with more the next fr
 constexpr int kCertifyRounds = 24;
 constexpr int kFitSteps = 6;
 constexpr double kFitWideExponent = 0.5;
-constexpr int kBluntPasses = 8;         // of flips and nudges
+constexpr int kBluntRounds = 3, kBluntPasses = 4;
 constexpr double kBluntShare = 0.96;    // of the tolerance, for the triangles they change
 constexpr double kAngleFloor = 2.0;     // resolutions: sharp edges are as round as the grid makes them
 constexpr double kLeastSpacing = 5e-4;  // resolutions: a single node inside may leave no more than that
@@ -391,29 +391,19 @@ struct Tracker::Impl {
         Blunter blunter(points, triangles, std::move(movable), surface, kBluntShare * l.tolerance);
         const std::size_t missed_before = inspection.missed.size();
         const LatticeTopology topology = std::move(inspection.topology);
-        const auto inspect = [&] { inspection = inspector.inspect_both_ways(mesh); };
-        for (int pass = 0; pass < kBluntPasses; ++pass) {
-            std::vector<Blunting> changes = blunter.pass();
-            if (changes.empty()) break;
-            for (const Blunting& change : changes)
+        const auto misses_more = [&] {
+            for (const Blunting& change : blunter.changes())
                 if (change.vertex < 0)
                     for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
-            for (inspect(); inspection.missed.size() > missed_before && !changes.empty(); inspect()) {
-                const auto at_missed = [&](const Blunting& change) {
-                    Box box;
-                    for (const int t : change.triangle)
-                        for (const int v : triangles[t]) box.extend(points[v]);
-                    return std::any_of(
-                        inspection.missed.begin(), inspection.missed.end(),
-                        [&](const auto& c) { return box.exteriorDistance(c.point) <= l.tolerance; });
-                };
-                const auto kept = std::stable_partition(changes.begin(), changes.end(),
-                                                        [&](const Blunting& c) { return !at_missed(c); });
-                const auto from = kept == changes.end() ? changes.begin() : kept;
-                std::for_each(from, changes.end(), [&](const Blunting& change) { blunter.undo(change); });
-                changes.erase(from, changes.end());
+            inspection = inspector.inspect_both_ways(mesh);
+            return inspection.missed.size() > missed_before;
+        };
+        for (int round = 0; round < kBluntRounds && blunter.run(kBluntPasses); ++round)
+            while (misses_more()) {
+                std::vector<Vec3> places;
+                for (const auto& c : inspection.missed) places.push_back(c.point);
+                if (!blunter.undo_near(places, l.tolerance)) break;
             }
-        }
         inspection.topology = topology;
     }
 

@@ -16,8 +16,8 @@ struct Blunting {
     Vec3 from = Vec3::Zero();      ///< Where it was.
 };
 
-/// Makes the sharp triangles of a mesh blunter, pass by pass. The mesh must be closed, oriented, manifold and
-/// free of crossings, and stays so; its topology does not change.
+/// Makes the sharp triangles of a mesh blunter. The mesh must be closed, oriented, manifold and free of
+/// crossings, and stays so; its topology does not change.
 class Blunter {
 public:
     /// All but `movable` (one entry per point) must outlive it; nobody else may change the mesh meanwhile.
@@ -25,26 +25,34 @@ public:
             const Surface& surface, double tolerance);
 
     /// Looks at the triangles with an angle below 30 degrees, sharpest first, but for those that were looked
-    /// at in vain and have not changed since. Flips the longest edge, or moves a corner that is movable along
-    /// the surface, its height above it kept, where the smallest angle of the triangles concerned grows by a
-    /// tenth or more, all of them face the way the surface does, or no worse than before, are within
-    /// `tolerance` of it, and cross no other triangle. No two changes of a pass share a triangle. Points that
-    /// move keep no more digits than floats.
-    std::vector<Blunting> pass();
+    /// at in vain and have not changed since; so often, or until nothing changes. Flips the longest edge, or
+    /// moves a corner that is movable along the surface, its height above it kept, where the smallest angle
+    /// of the triangles concerned grows by a tenth or more, all of them face the way the surface does, or no
+    /// worse than before, are within `tolerance` of it, and cross no other triangle. Points that move keep no
+    /// more digits than floats. Returns whether anything changed.
+    bool run(int passes);
 
-    /// Takes a change of the last pass back; a vertex that moved is not movable any more.
-    void undo(const Blunting& change);
+    /// Takes back the changes of which a triangle's box is within `distance` of one of these places, and what
+    /// was changed upon them; all, if there is none. Their vertices are not movable any more. Returns whether
+    /// there was anything to take back.
+    bool undo_near(const std::vector<Vec3>& places, double distance);
+
+    /// All that was changed and not taken back.
+    const std::vector<Blunting>& changes() const { return changes_; }
 
 private:
-    void undo_crossing(std::vector<Blunting>& changes);
-    void reopen(const Blunting& change);
+    bool pass();
+    void undo(const std::vector<char>& marked);
+    void undo_crossing();
 
     std::vector<Vec3>& points_;
     std::vector<Triangle>& triangles_;
     std::vector<char> movable_;
     const Surface& surface_;
     double tolerance_;
-    std::vector<char> open_;  // per vertex: triangles around it are to be looked at
+    std::vector<char> open_;       // per vertex: triangles around it are to be looked at
+    std::vector<char> unchecked_;  // per triangle: changed since crossings were looked for
+    std::vector<Blunting> changes_;
 };
 
 }  // namespace isotrack
