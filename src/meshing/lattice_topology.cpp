@@ -16,12 +16,6 @@ namespace {
 
 using Node = std::array<int, 3>;
 
-/// Where a lattice line in the third direction meets the mesh.
-struct Hit {
-    int x, y, component;
-    double z;  // lattice units
-};
-
 /// Triangles joined through common vertices. Components are numbered in the order of their first triangle.
 std::vector<int> component_of_triangles(std::size_t vertices, const std::vector<Triangle>& triangles,
                                         int& count) {
@@ -58,11 +52,11 @@ double area2(const Vec3& p, const Vec3& q, double x, double y) {
     return swap ? -area : area;
 }
 
-std::vector<Hit> hits_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                         const std::vector<int>& component) {
+std::vector<LineHit> hits_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                             const std::vector<int>& component) {
     constexpr std::size_t kBlock = 512;
-    std::vector<std::vector<Hit>> blocks((triangles.size() + kBlock - 1) / kBlock);
-    const auto add_hits = [&](std::size_t t, std::vector<Hit>& hits) {
+    std::vector<std::vector<LineHit>> blocks((triangles.size() + kBlock - 1) / kBlock);
+    const auto add_hits = [&](std::size_t t, std::vector<LineHit>& hits) {
         const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]], &c = points[triangles[t][2]];
         const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
         for (int x = static_cast<int>(std::ceil(low.x() - kBeside[0])); x + kBeside[0] <= high.x(); ++x)
@@ -77,29 +71,34 @@ std::vector<Hit> hits_of(const std::vector<Vec3>& points, const std::vector<Tria
         const std::size_t end = std::min(triangles.size(), (block + 1) * kBlock);
         for (std::size_t t = block * kBlock; t < end; ++t) add_hits(t, blocks[block]);
     });
-    std::vector<Hit> hits;
+    std::vector<LineHit> hits;
     for (const auto& block : blocks) hits.insert(hits.end(), block.begin(), block.end());
     return hits;
 }
 
-/// Sorts by x, then by `less`.
+/// Sorts by x, then by `less`. Returns where each x begins, from the least on, and the end.
 template <typename Less>
-void sort_by_x(std::vector<Hit>& hits, const Less& less) {
-    if (hits.empty()) return;
-    const auto [low, high] =
-        std::minmax_element(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) { return a.x < b.x; });
+std::vector<std::size_t> sort_by_x(std::vector<LineHit>& hits, const Less& less) {
+    if (hits.empty()) return {};
+    const auto [low, high] = std::minmax_element(
+        hits.begin(), hits.end(), [](const LineHit& a, const LineHit& b) { return a.x < b.x; });
     const int from = low->x;
     std::vector<std::size_t> first(static_cast<std::size_t>(high->x - from) + 2, 0);
-    for (const Hit& h : hits) ++first[h.x - from + 1];
+    for (const LineHit& h : hits) ++first[h.x - from + 1];
     for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
     std::vector<std::size_t> end(first.begin(), first.end() - 1);
-    std::vector<Hit> sorted(hits.size());
-    for (const Hit& h : hits) sorted[end[h.x - from]++] = h;
+    std::vector<LineHit> sorted(hits.size());
+    for (const LineHit& h : hits) sorted[end[h.x - from]++] = h;
     hits.swap(sorted);
     tbb::parallel_for(std::size_t{0}, first.size() - 1, [&](std::size_t i) {
         std::sort(hits.begin() + static_cast<std::ptrdiff_t>(first[i]),
                   hits.begin() + static_cast<std::ptrdiff_t>(first[i + 1]), less);
     });
+    return first;
+}
+
+bool is_before(const LineHit& a, const LineHit& b) {
+    return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
 
 /// Sets of a node's 26 neighbours as bits; bit 9 (x + 1) + 3 (y + 1) + z + 1, the node itself is bit 13.
@@ -185,24 +184,55 @@ bool is_joined(std::uint32_t inside, const Node& to) {
 
 }  // namespace
 
-LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                                 const Surface& surface, const std::vector<Surface::Crossing>& crossings) {
+LatticeSides::LatticeSides(const Surface& surface, const std::vector<Surface::Crossing>& crossings)
+    : surface_(surface) {
     const Eigen::Affine3d lattice = surface.lattice(), to_lattice = lattice.inverse();
+    const auto probe = surface.probe();
+    for (const auto& c : crossings) {
+        const Vec3 way = to_lattice.linear() * c.outward.cast<double>(), p = to_lattice * c.point;
+        if (std::abs(way.z()) < 0.5 * way.norm()) continue;
+        const Node nearest = {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y())),
+                              static_cast<int>(std::lround(p.z()))};
+        // The crossing counts in the middle between its two nodes; on a node rounding decides which those
+        // are.
+        const double beyond = p.z() - nearest[2];
+        const auto is_inside = [&] {
+            return probe->value(lattice * Vec3(nearest[0], nearest[1], nearest[2])) < 0.0;
+        };
+        const bool up = std::abs(beyond) > kOnNode ? beyond > 0.0 : is_inside() == (way.z() > 0.0);
+        hits_.push_back({nearest[0], nearest[1], 0, nearest[2] + (up ? 0.5 : -0.5)});
+    }
+    first_ = sort_by_x(hits_, is_before);
+}
+
+std::pair<const LineHit*, const LineHit*> LatticeSides::line(int x, int y) const {
+    const LineHit* none = nullptr;
+    if (hits_.empty() || x < hits_.front().x || x > hits_.back().x) return {none, none};
+    const std::size_t at = static_cast<std::size_t>(x - hits_.front().x);
+    const LineHit *begin = hits_.data() + first_[at], *end = hits_.data() + first_[at + 1];
+    begin = std::partition_point(begin, end, [&](const LineHit& h) { return h.y < y; });
+    return {begin, std::find_if(begin, end, [&](const LineHit& h) { return h.y != y; })};
+}
+
+LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                 const LatticeSides& sides) {
+    const Surface& surface = sides.surface();
+    const Eigen::Affine3d lattice = sides.surface().lattice(), to_lattice = lattice.inverse();
     std::vector<Vec3> in_lattice;
     in_lattice.reserve(points.size());
     for (const Vec3& p : points) in_lattice.push_back(to_lattice * p);
     int components = 0;
     const std::vector<int> component = component_of_triangles(points.size(), triangles, components);
-    std::vector<Hit> hits = hits_of(in_lattice, triangles, component);
+    std::vector<LineHit> hits = hits_of(in_lattice, triangles, component);
     LatticeTopology result;
 
     // Components with a node between two hits of their own.
-    sort_by_x(hits, [](const Hit& a, const Hit& b) {
+    sort_by_x(hits, [](const LineHit& a, const LineHit& b) {
         return std::tie(a.component, a.y, a.z) < std::tie(b.component, b.y, b.z);
     });
     std::vector<char> holds_node(components, 0);
     for (std::size_t h = 0; h + 1 < hits.size();) {
-        const Hit &a = hits[h], &b = hits[h + 1];
+        const LineHit &a = hits[h], &b = hits[h + 1];
         if (std::tie(a.component, a.x, a.y) != std::tie(b.component, b.x, b.y)) {
             ++h;  // an odd hit: the line grazes an edge
             continue;
@@ -217,27 +247,14 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
     // Mesh and surface cross each line at places of their own; between two of them the nodes are on the wrong
     // side.
     hits.erase(
-        std::remove_if(hits.begin(), hits.end(), [&](const Hit& h) { return !holds_node[h.component]; }),
+        std::remove_if(hits.begin(), hits.end(), [&](const LineHit& h) { return !holds_node[h.component]; }),
         hits.end());
-    const auto probe = surface.probe();
-    const auto is_inside = [&](const Node& n) {
-        return probe->value(lattice * Vec3(n[0], n[1], n[2])) < 0.0;
-    };
-    for (const auto& c : crossings) {
-        const Vec3 way = to_lattice.linear() * c.outward.cast<double>(), p = to_lattice * c.point;
-        if (std::abs(way.z()) < 0.5 * way.norm()) continue;
-        const Node nearest = {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y())),
-                              static_cast<int>(std::lround(p.z()))};
-        // The crossing counts in the middle between its two nodes; on a node rounding decides which those
-        // are.
-        const double beyond = p.z() - nearest[2];
-        const bool up = std::abs(beyond) > kOnNode ? beyond > 0.0 : is_inside(nearest) == (way.z() > 0.0);
-        hits.push_back({nearest[0], nearest[1], 0, nearest[2] + (up ? 0.5 : -0.5)});
-    }
-    sort_by_x(hits, [](const Hit& a, const Hit& b) { return std::tie(a.y, a.z) < std::tie(b.y, b.z); });
+    sort_by_x(hits, is_before);
+    std::vector<LineHit> both(hits.size() + sides.hits().size());
+    std::merge(hits.begin(), hits.end(), sides.hits().begin(), sides.hits().end(), both.begin(), is_before);
     std::vector<Node> wrong;  // ascending
-    for (std::size_t h = 0; h + 1 < hits.size();) {
-        const Hit &a = hits[h], &b = hits[h + 1];
+    for (std::size_t h = 0; h + 1 < both.size();) {
+        const LineHit &a = both[h], &b = both[h + 1];
         if (std::tie(a.x, a.y) != std::tie(b.x, b.y)) {
             ++h;
             continue;
@@ -258,16 +275,24 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
         Surface::Probe& own_probe = probes.local();
         for (std::size_t w = range.begin(); w < range.end(); ++w)
             for (int x = -1; x <= 1; ++x)
-                for (int y = -1; y <= 1; ++y)
+                for (int y = -1; y <= 1; ++y) {
+                    const Node low = {wrong[w][0] + x, wrong[w][1] + y, wrong[w][2] - 1};
+                    const auto [begin, end] = sides.line(low[0], low[1]);
+                    const bool known = (end - begin) % 2 == 0;  // it comes out where it went in
+                    auto at = std::lower_bound(wrong.begin(), wrong.end(), low);
                     for (int z = -1; z <= 1; ++z) {
-                        const Node m = {wrong[w][0] + x, wrong[w][1] + y, wrong[w][2] + z};
-                        const auto at = std::lower_bound(wrong.begin(), wrong.end(), m);
+                        const Node m = {low[0], low[1], wrong[w][2] + z};
+                        while (at != wrong.end() && *at < m) ++at;
                         const bool is_wrong = at != wrong.end() && *at == m;
-                        const bool inside = own_probe.value(lattice * Vec3(m[0], m[1], m[2])) < 0.0;
+                        const auto below =
+                            std::count_if(begin, end, [&](const LineHit& h) { return h.z < m[2]; });
+                        const bool inside =
+                            known ? below % 2 == 1 : own_probe.value(lattice * Vec3(m[0], m[1], m[2])) < 0.0;
                         if (inside != is_wrong) around[w].inside |= 1u << bit_of(x, y, z);
                         around[w].wrong[bit_of(x, y, z)] =
                             is_wrong ? static_cast<int>(at - wrong.begin()) : -1;
                     }
+                }
     });
     // Inside nodes that hang together, none of them inside the mesh, are a component that is lost even where
     // a corner joins them to others.

@@ -179,8 +179,8 @@ void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspectio
 }
 
 void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {
-    inspection.topology =
-        lattice_topology(mesh.vertices, mesh.carved.triangles, surface_, crossings_.crossings());
+    if (!sides_) sides_.emplace(surface_, crossings_.crossings());
+    inspection.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, *sides_);
     doubt(inspection.topology.faults, fault_spacing_, inspection);
     fault_spacing_ = kVainSpacing;
 }

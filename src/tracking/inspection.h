@@ -1,6 +1,7 @@
 // One frame's mesh held against its surface, and what would mend it.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "isotrack/meshing/certify.h"
@@ -63,6 +64,7 @@ private:
     std::vector<TriangleError> errors_;  // of each
     std::vector<Facet> reached_;         // of the last inspection of the crossings
     std::vector<double> distances_;      // to them, per crossing
+    std::optional<LatticeSides> sides_;
     double fault_spacing_ = 0.8;         // resolutions; less from the second look on
 };
 

@@ -21,7 +21,7 @@ using support::join;
 using support::torus;
 
 LatticeTopology topology_of(const TriangleMesh& mesh, const Surface& surface) {
-    return lattice_topology(mesh.points, mesh.triangles, surface, surface.crossings());
+    return lattice_topology(mesh.points, mesh.triangles, LatticeSides(surface, surface.crossings()));
 }
 
 TEST(LatticeTopology, HasNoFaultsWhereOnlyNodesNearTheSurfaceAreOnTheWrongSide) {

@@ -1,6 +1,8 @@
 // Whether a mesh has the topology that the signs at the lattice nodes have.
 #pragma once
 
+#include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "isotrack/surface/surface.h"
@@ -21,9 +23,34 @@ struct LatticeTopology {
     bool has_specks = false;
 };
 
-/// The mesh must be closed. `crossings` are those of `surface`. Nodes count as on the side of the mesh that
-/// the lattice line in the third direction through them says.
+/// Where a lattice line in the third direction meets a surface or a mesh.
+struct LineHit {
+    int x, y, component;  ///< Of the line; of the mesh.
+    double z;             ///< Lattice units.
+};
+
+/// The sides of the lattice nodes of a surface, to hold meshes of it against. Read-only, so threads may share
+/// it.
+class LatticeSides {
+public:
+    /// `crossings` are those of `surface`, which must outlive this.
+    LatticeSides(const Surface& surface, const std::vector<Surface::Crossing>& crossings);
+
+    const Surface& surface() const { return surface_; }
+    /// Along the lines, halfway between the two nodes of each crossed edge; ascending in x, y and z.
+    const std::vector<LineHit>& hits() const { return hits_; }
+    /// Those of one line.
+    std::pair<const LineHit*, const LineHit*> line(int x, int y) const;
+
+private:
+    const Surface& surface_;
+    std::vector<LineHit> hits_;
+    std::vector<std::size_t> first_;  // of each x from the least
+};
+
+/// The mesh must be closed. Nodes count as on the side of the mesh that the lattice line in the third
+/// direction through them says.
 LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                                 const Surface& surface, const std::vector<Surface::Crossing>& crossings);
+                                 const LatticeSides& sides);
 
 }  // namespace isotrack
