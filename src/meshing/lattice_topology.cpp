@@ -242,7 +242,6 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
     }
     result.speck.resize(triangles.size());
     for (std::size_t t = 0; t < triangles.size(); ++t) result.speck[t] = !holds_node[component[t]];
-    result.has_specks = std::count(holds_node.begin(), holds_node.end(), 0) > 0;
 
     // Mesh and surface cross each line at places of their own; between two of them the nodes are on the wrong
     // side.

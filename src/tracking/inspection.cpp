@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "meshing/sharpness.h"
+#include "sampling/compact.h"
 
 namespace isotrack {
 namespace {
@@ -233,27 +234,76 @@ void report(const FrameMesh& mesh, const Inspection& inspection, const SizingLim
     frame.within_tolerance = frame.max_error <= limits.tolerance && frame.lost_crossings == 0;
 }
 
-void remove_specks(FrameMesh& mesh, const Inspection& inspection) {
-    if (!inspection.topology.has_specks) return;
-    CarvedSurface& carved = mesh.carved;
-    std::vector<Triangle> kept;
-    for (std::size_t t = 0; t < carved.triangles.size(); ++t)
-        if (!inspection.topology.speck[t]) kept.push_back(carved.triangles[t]);
-    std::vector<int> number(mesh.vertices.size(), -1), particle;
-    for (const Triangle& t : kept)
-        for (const int v : t) number[v] = 0;
-    std::vector<Vec3> vertices;
-    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-        if (number[v] < 0) continue;
-        number[v] = static_cast<int>(vertices.size());
-        vertices.push_back(mesh.vertices[v]);
-        particle.push_back(carved.particle[v]);
-    }
-    for (Triangle& t : kept)
+namespace {
+
+FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out) {
+    FrameMesh result = mesh;
+    CarvedSurface& carved = result.carved;
+    std::vector<char> keep;
+    for (const char flag : left_out) keep.push_back(!flag);
+    compact(carved.triangles, keep);
+    compact(carved.inside_cell, keep);
+    compact(carved.inside_facet, keep);
+    keep.assign(mesh.vertices.size(), 0);
+    for (const Triangle& t : carved.triangles)
+        for (const int v : t) keep[v] = 1;
+    compact(result.vertices, keep);
+    compact(result.on_surface, keep);
+    compact(carved.particle, keep);
+    const std::vector<int> number = numbers_after(keep);
+    for (Triangle& t : carved.triangles)
         for (int& v : t) v = number[v];
-    mesh.vertices = std::move(vertices);
-    carved.triangles = std::move(kept);
-    carved.particle = std::move(particle);
+    return result;
+}
+
+/// Takes the flags off the components with a triangle whose box is within `distance` of one of `places`.
+/// Returns whether there were any.
+bool spare_near(const std::vector<Surface::Crossing>& places, double distance, const FrameMesh& mesh,
+                std::vector<char>& flags) {
+    std::vector<char> spared(mesh.vertices.size(), 0);
+    const auto spare = [&](std::size_t t) {
+        flags[t] = 0;
+        for (const int v : mesh.carved.triangles[t]) spared[v] = 1;
+    };
+    bool any = false;
+    for (std::size_t t = 0; t < flags.size(); ++t) {
+        if (!flags[t]) continue;
+        Box box;
+        for (const int v : mesh.carved.triangles[t]) box.extend(mesh.vertices[v]);
+        if (std::none_of(places.begin(), places.end(),
+                         [&](const auto& c) { return box.exteriorDistance(c.point) <= distance; }))
+            continue;
+        spare(t);
+        any = true;
+    }
+    for (bool more = any; more;) {
+        more = false;
+        for (std::size_t t = 0; t < flags.size(); ++t) {
+            const auto& [i, j, k] = mesh.carved.triangles[t];
+            if (!flags[t] || !(spared[i] || spared[j] || spared[k])) continue;
+            spare(t);
+            more = true;
+        }
+    }
+    return any;
+}
+
+}  // namespace
+
+void remove_specks(FrameMesh& mesh, Inspection& inspection, Inspector& inspector,
+                   const SizingLimits& limits) {
+    std::vector<char> specks = inspection.topology.speck;
+    if (std::find(specks.begin(), specks.end(), 1) == specks.end()) return;
+    for (;;) {
+        FrameMesh rest = without(mesh, specks);
+        Inspection after = inspector.inspect_both_ways(rest);
+        if (after.missed.size() > inspection.missed.size() &&
+            spare_near(after.missed, limits.tolerance, mesh, specks))
+            continue;
+        mesh = std::move(rest);
+        inspection = std::move(after);
+        return;
+    }
 }
 
 }  // namespace isotrack

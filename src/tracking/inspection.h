@@ -79,7 +79,8 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
 void report(const FrameMesh& mesh, const Inspection& inspection, const SizingLimits& limits,
             TrackedFrame& frame);
 
-/// Takes components without a lattice node off the mesh.
-void remove_specks(FrameMesh& mesh, const Inspection& inspection);
+/// Takes components without a lattice node off the mesh just inspected, but for those that stand for crossings
+/// which nothing else stands for.
+void remove_specks(FrameMesh& mesh, Inspection& inspection, Inspector& inspector, const SizingLimits& limits);
 
 }  // namespace isotrack

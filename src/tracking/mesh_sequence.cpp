@@ -246,10 +246,10 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         return std::async(std::launch::async, read_frame, input.frames[i].path, std::cref(options));
     };
 
-    /// A frame whose mesh is being written.
+    /// The last frame, whose mesh is being finished and written.
     struct Pending {
         FrameReport row;
-        std::future<double> written;
+        std::future<FrameReport> written;
     };
     std::optional<Pending> pending;
     bool stop = false;
@@ -264,7 +264,7 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         auto written = std::move(pending->written);
         pending.reset();
         try {
-            row.seconds["write"] = written.get();
+            row = written.get();
         } catch (const std::exception& error) {
             row.status = "failed";
             row.message = error.what();
@@ -312,9 +312,9 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         const int frames_passed = row.frame - tracked_frame;
         if (velocity && frames_passed > 0)
             motion = motion_along(velocity, frames_passed / options.fps.value_or(1.0));
-        TrackedFrame tracked;
+        Tracker::Finish finish_mesh = [] { return TrackedFrame(); };
         try {
-            if (tracker) tracked = tracker->advance(*read.level_set, motion);
+            if (tracker) finish_mesh = tracker->begin(*read.level_set, motion);
         } catch (const std::exception& error) {
             finish_pending();
             row.status = "failed";
@@ -324,18 +324,21 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
             continue;
         }
         const double per_time = options.fps.value_or(1.0) / std::max(1, frames_passed);
-        for (Vec3& v : tracked.mesh.velocities) v *= per_time;
         velocity = read.velocity;
         tracked_frame = row.frame;
-        describe(tracked, *read.level_set, tolerance, row);
-        row.seconds["read"] = read.seconds;
-        row.seconds["total"] = seconds_since(start);
         finish_pending();
         if (stop) break;
-        auto write = [mesh = std::move(tracked.mesh), path = row.output] {
+        auto write = [row, start, per_time, tolerance, finish_mesh = std::move(finish_mesh),
+                      read_seconds = read.seconds, level_set = std::move(read.level_set)]() mutable {
+            TrackedFrame tracked = finish_mesh();
+            for (Vec3& v : tracked.mesh.velocities) v *= per_time;
+            describe(tracked, *level_set, tolerance, row);
+            row.seconds["read"] = read_seconds;
+            row.seconds["total"] = seconds_since(start);
             const auto write_start = Clock::now();
-            write_mesh(mesh, path);
-            return seconds_since(write_start);
+            write_mesh(tracked.mesh, row.output);
+            row.seconds["write"] = seconds_since(write_start);
+            return row;
         };
         pending.emplace(Pending{std::move(row), std::async(std::launch::async, std::move(write))});
     }

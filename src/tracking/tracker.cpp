@@ -135,6 +135,58 @@ void round_to_float(Particles& particles) {
     for (Vec3& p : particles.position) p = to_float_precision(p);
 }
 
+/// A frame in the making.
+struct Work {
+    const Surface& surface;
+    const SizingLimits limits;
+    TrackedFrame frame;
+    FrameMesh mesh;
+    std::optional<CrossingGrid> crossings;
+    std::optional<Inspector> inspector;  // of this mesh
+    Inspection inspection;
+
+    /// Makes sharp triangles blunter where the mesh goes on reaching all it reached. The particles stay where
+    /// they are: the next frame's triangles are others.
+    void blunt() {
+        const StageTimer timer(frame.seconds, "blunt");
+        const auto& particle = mesh.carved.particle;
+        const int last = particle.empty() ? -1 : *std::max_element(particle.begin(), particle.end());
+        std::vector<int> vertex(last + 1, -1);
+        std::vector<char> movable;
+        for (const int p : particle) {
+            const int v = static_cast<int>(movable.size());
+            movable.push_back(p >= 0 && vertex[p] < 0);
+            if (p < 0) continue;
+            if (vertex[p] >= 0) movable[vertex[p]] = 0;  // copies stay where they are
+            vertex[p] = v;
+        }
+        Blunter blunter(mesh.vertices, mesh.carved.triangles, std::move(movable), surface,
+                        kBluntShare * limits.tolerance);
+        const std::size_t missed_before = inspection.missed.size();
+        const auto misses_more = [&] {
+            for (const Blunting& change : blunter.changes())
+                if (change.vertex < 0)
+                    for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
+            inspection = inspector->inspect_both_ways(mesh);
+            return inspection.missed.size() > missed_before;
+        };
+        for (int round = 0; round < kBluntRounds && blunter.run(kBluntPasses); ++round)
+            while (misses_more()) {
+                std::vector<Vec3> places;
+                for (const auto& c : inspection.missed) places.push_back(c.point);
+                if (!blunter.undo_near(places, limits.tolerance)) break;
+            }
+    }
+
+    TrackedFrame finish(Method method) {
+        if (method != Method::Paper) blunt();
+        report(mesh, inspection, limits, frame);
+        frame.mesh.points = std::move(mesh.vertices);
+        frame.mesh.triangles = std::move(mesh.carved.triangles);
+        return std::move(frame);
+    }
+};
+
 }  // namespace
 
 struct Tracker::Impl {
@@ -376,37 +428,6 @@ struct Tracker::Impl {
                        least, next_id);
     }
 
-    /// Makes sharp triangles blunter where the mesh goes on reaching all it reached. The particles stay where
-    /// they are: the next frame's triangles are others.
-    void blunt(FrameMesh& mesh, Inspection& inspection, Inspector& inspector, const Surface& surface,
-               const SizingLimits& l, std::map<std::string, double>& seconds) {
-        const StageTimer timer(seconds, "blunt");
-        auto& points = mesh.vertices;
-        auto& triangles = mesh.carved.triangles;
-        std::vector<int> copies(particles.size(), 0);
-        for (const int p : mesh.carved.particle)
-            if (p >= 0) ++copies[p];
-        std::vector<char> movable;
-        for (const int p : mesh.carved.particle) movable.push_back(p >= 0 && copies[p] == 1);
-        Blunter blunter(points, triangles, std::move(movable), surface, kBluntShare * l.tolerance);
-        const std::size_t missed_before = inspection.missed.size();
-        const LatticeTopology topology = std::move(inspection.topology);
-        const auto misses_more = [&] {
-            for (const Blunting& change : blunter.changes())
-                if (change.vertex < 0)
-                    for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
-            inspection = inspector.inspect_both_ways(mesh);
-            return inspection.missed.size() > missed_before;
-        };
-        for (int round = 0; round < kBluntRounds && blunter.run(kBluntPasses); ++round)
-            while (misses_more()) {
-                std::vector<Vec3> places;
-                for (const auto& c : inspection.missed) places.push_back(c.point);
-                if (!blunter.undo_near(places, l.tolerance)) break;
-            }
-        inspection.topology = topology;
-    }
-
     /// The newborn move like the neighbours that were there before; alone among newborn they rest.
     void inherit_velocities(const std::vector<Triangle>& triangles, Id first_new) {
         std::vector<int> count(particles.size(), 0);
@@ -429,7 +450,7 @@ struct Tracker::Impl {
     void remember(const FrameMesh& mesh);
     void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
-    TrackedFrame advance(const Surface& surface, const Motion& motion);
+    Finish begin(const Surface& surface, const Motion& motion);
 };
 
 /// Rounds of: mesh, measure, size, relax, births and deaths. More of them the more particles are new.
@@ -511,12 +532,16 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
     frame.relocated = structure.dt().profile().relocated;
 }
 
-TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion) {
-    TrackedFrame frame;
+Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motion) {
+    const auto work = std::make_shared<Work>(Work{surface, limits(surface), {}, {}, {}, {}, {}});
+    const SizingLimits& l = work->limits;
+    TrackedFrame& frame = work->frame;
+    FrameMesh& mesh = work->mesh;
+    std::optional<Inspector>& inspector = work->inspector;
+    Inspection& inspection = work->inspection;
     auto& seconds = frame.seconds;
     frame.delaunay_strategy = name_of(strategy());
     const std::size_t relocated = dt->profile().relocated;
-    const SizingLimits l = limits(surface);
     const std::vector<Id> before = particles.id;
     const bool warm = !particles.empty();
     const Id first_new = next_id;
@@ -524,23 +549,18 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
         const StageTimer timer(seconds, "carry");
         frame.lost = carry(surface, motion);
     }
-    std::optional<CrossingGrid> found;
     {
         const StageTimer timer(seconds, "cover");
-        found.emplace(surface);
-        frame.seeded = cover(particles, surface, *found, l, options.seed, next_id);
+        work->crossings.emplace(surface);
+        frame.seeded = cover(particles, surface, *work->crossings, l, options.seed, next_id);
     }
-    const CrossingGrid& crossings = *found;
     if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
     else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))
         follow(surface, l, frame);
     else
         sample(surface, l, warm, frame);
-    FrameMesh mesh;
     Fitted fitted;
-    std::optional<Inspector> inspector;
-    Inspection inspection;
     const auto make_mesh = [&] {
         mesh = carve_mesh(surface, seconds);
         if (options.fit) fit_vertices(mesh, fitted, surface, seconds);
@@ -549,7 +569,7 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
     std::size_t added = 0;
     for (int mending = 0;; ++mending) {
         tetrahedralise(true, seconds);
-        inspector.emplace(surface, l, crossings);
+        inspector.emplace(surface, l, *work->crossings);
         fitted = {};
         make_mesh();
         const StageTimer timer(seconds, "certify");
@@ -583,33 +603,33 @@ TrackedFrame Tracker::Impl::advance(const Surface& surface, const Motion& motion
             if (passes()) break;
         }
     }
-    if (options.method != Method::Paper) blunt(mesh, inspection, *inspector, surface, l, seconds);
     frame.relocated += dt->profile().relocated - relocated;
-    report(mesh, inspection, l, frame);
     remember(mesh);
-    remove_specks(mesh, inspection);
+    {
+        const StageTimer timer(seconds, "certify");
+        remove_specks(mesh, inspection, *inspector, l);
+    }
     inherit_velocities(particle_triangles(mesh.carved), first_new);
 
-    frame.mesh.points = mesh.vertices;
-    frame.mesh.triangles = mesh.carved.triangles;
     std::vector<char> seen(particles.size(), 0);
-    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-        const int p = mesh.carved.particle[v];
+    for (const int p : mesh.carved.particle) {
         const bool own = p >= 0 && !seen[p];
         if (own) seen[p] = 1;
         frame.mesh.ids.push_back(own ? particles.id[p] : next_id++);
         frame.mesh.velocities.push_back(p >= 0 ? particles.velocity[p] : Vec3::Zero());
     }
-    if (options.border == Border::Open) {
-        std::vector<char> at_border;
-        for (const Vec3& p : frame.mesh.points) at_border.push_back(surface.at_border(p));
-        frame.opened = open_border(frame.mesh, at_border, next_id) > 0;
-    }
     frame.particles = particles.size();
     const std::unordered_set<Id> now(particles.id.begin(), particles.id.end());
     for (const Id id : particles.id) frame.born += id >= first_new;
     for (const Id id : before) frame.died += now.count(id) == 0;
-    return frame;
+    if (options.border == Border::Close)
+        return [work, method = options.method] { return work->finish(method); };
+
+    frame = work->finish(options.method);  // ids of what is cut open are given in the order of the frames
+    std::vector<char> at_border;
+    for (const Vec3& p : frame.mesh.points) at_border.push_back(surface.at_border(p));
+    frame.opened = open_border(frame.mesh, at_border, next_id) > 0;
+    return [work] { return std::move(work->frame); };
 }
 
 double default_angle_deg(Method method) {
@@ -621,7 +641,10 @@ Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;
 TrackedFrame Tracker::advance(const Surface& surface, const Motion& motion) {
-    return impl_->advance(surface, motion);
+    return begin(surface, motion)();
+}
+Tracker::Finish Tracker::begin(const Surface& surface, const Motion& motion) {
+    return impl_->begin(surface, motion);
 }
 const Particles& Tracker::particles() const {
     return impl_->particles;

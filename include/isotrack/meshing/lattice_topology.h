@@ -20,7 +20,6 @@ struct LatticeTopology {
     std::vector<Vec3> faults;
     /// Per triangle: it belongs to a component that holds no node on its own. No such thing is in a grid.
     std::vector<char> speck;
-    bool has_specks = false;
 };
 
 /// Where a lattice line in the third direction meets a surface or a mesh.

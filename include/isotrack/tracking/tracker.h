@@ -68,7 +68,7 @@ struct TrackedFrame {
     std::size_t lost_crossings = 0;  ///< Features below the grid's resolution that the mesh does not hold.
     bool within_tolerance = true;    ///< max_error is at most the tolerance and nothing is lost.
     std::map<std::string, double>
-        seconds;  ///< Per stage: carry, cover, size, relax, delaunay, convect, fit, certify, flip.
+        seconds;  ///< Per stage: carry, cover, size, relax, delaunay, convect, fit, certify, blunt.
 };
 
 /// Follows one surface. Not for concurrent use: frames depend on each other. Uses TBB inside.
@@ -87,6 +87,13 @@ public:
     /// extrapolated. An empty surface gives an empty mesh and drops all particles; the next surface with
     /// something in it starts afresh, ids counting on.
     TrackedFrame advance(const Surface& surface, const Motion& motion = {});
+
+    /// What is left to do of a frame when its particles are final. To be called once, on any thread, beside
+    /// the tracker's next frames if one likes.
+    using Finish = std::function<TrackedFrame()>;
+
+    /// The same in two steps; `surface` must live until the second is done.
+    Finish begin(const Surface& surface, const Motion& motion = {});
 
     /// The particles of the last frame.
     const Particles& particles() const;

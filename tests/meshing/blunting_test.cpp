@@ -1,0 +1,206 @@
+// Blunting of meshes whose sharp triangles are known.
+#include "isotrack/meshing/blunting.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "isotrack/meshing/certify.h"
+#include "isotrack/meshing/mesh_topology.h"
+#include "isotrack/meshing/self_intersections.h"
+#include "isotrack/surface/shapes.h"
+#include "support/meshes.h"
+
+namespace isotrack {
+namespace {
+
+double smallest_angle(const std::vector<Vec3>& points, const Triangle& t) {
+    double least = 180.0;
+    for (int k = 0; k < 3; ++k) {
+        const Vec3 u = (points[t[(k + 1) % 3]] - points[t[k]]).normalized(),
+                   w = (points[t[(k + 2) % 3]] - points[t[k]]).normalized();
+        least = std::min(least, std::acos(std::clamp(u.dot(w), -1.0, 1.0)) * 180.0 / std::acos(-1.0));
+    }
+    return least;
+}
+
+/// A unit sphere with vertices thrown about on it.
+TriangleMesh rough_sphere() {
+    TriangleMesh mesh = support::icosphere(3);
+    for (std::size_t v = 0; v < mesh.points.size(); ++v) {
+        const double a = 1.7 * static_cast<double>(v);
+        mesh.points[v] =
+            (mesh.points[v] + 0.05 * Vec3(std::cos(a), std::sin(2 * a), std::sin(a))).normalized();
+    }
+    return mesh;
+}
+
+std::vector<char> all_of(const TriangleMesh& mesh, bool movable) {
+    return std::vector<char>(mesh.points.size(), movable);
+}
+
+std::size_t count_sharp(const TriangleMesh& mesh) {
+    return std::count_if(mesh.triangles.begin(), mesh.triangles.end(),
+                         [&](const Triangle& t) { return smallest_angle(mesh.points, t) < 30.0; });
+}
+
+double least_angle(const TriangleMesh& mesh) {
+    double least = 180.0;
+    for (const Triangle& t : mesh.triangles) least = std::min(least, smallest_angle(mesh.points, t));
+    return least;
+}
+
+void expect_sound(const TriangleMesh& mesh, const Surface& surface, double tolerance) {
+    const MeshTopology topology = mesh_topology(mesh);
+    EXPECT_TRUE(topology.closed() && topology.manifold() && topology.oriented());
+    EXPECT_EQ(topology.euler, 2);
+    EXPECT_TRUE(self_intersections(mesh).empty());
+    for (const TriangleError& e : triangle_errors(mesh.points, mesh.triangles, surface, 6))
+        EXPECT_LE(e.largest, tolerance);
+}
+
+constexpr int kPasses = 4;
+constexpr double kTolerance = 0.05;
+
+TEST(Blunter, MakesSharpTrianglesBlunterAndKeepsTheMeshSound) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const TriangleMesh before = rough_sphere();
+    TriangleMesh after = before;
+    Blunter blunter(after.points, after.triangles, all_of(after, true), *sphere, kTolerance);
+    ASSERT_TRUE(blunter.run(kPasses));
+    ASSERT_GT(count_sharp(before), 20u);
+    EXPECT_LT(count_sharp(after), count_sharp(before) / 4);
+    EXPECT_GT(least_angle(after), 1.5 * least_angle(before));
+    expect_sound(after, *sphere, kTolerance);
+    std::size_t flips = 0, moves = 0;
+    for (const Blunting& change : blunter.changes()) ++(change.vertex < 0 ? flips : moves);
+    EXPECT_GT(flips, 0u);
+    EXPECT_GT(moves, 0u);
+    for (std::size_t v = 0; v < after.points.size(); ++v) {
+        if (after.points[v] == before.points[v]) continue;
+        EXPECT_NEAR(after.points[v].norm(), 1.0, 1e-6) << "left the surface";
+        for (int k = 0; k < 3; ++k) {
+            const volatile float single = static_cast<float>(after.points[v][k]);
+            EXPECT_EQ(after.points[v][k], static_cast<double>(single));
+        }
+    }
+}
+
+TEST(Blunter, KeepsTheHeightAboveTheSurface) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    TriangleMesh mesh = rough_sphere();
+    for (Vec3& p : mesh.points) p *= 1.02;
+    const auto before = mesh.points;
+    Blunter blunter(mesh.points, mesh.triangles, all_of(mesh, true), *sphere, kTolerance);
+    ASSERT_TRUE(blunter.run(kPasses));
+    EXPECT_NE(mesh.points, before);
+    for (const Vec3& p : mesh.points) EXPECT_NEAR(p.norm(), 1.02, 1e-6);
+}
+
+TEST(Blunter, MovesNothingThatIsNotMovable) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const TriangleMesh before = rough_sphere();
+    TriangleMesh after = before;
+    Blunter blunter(after.points, after.triangles, all_of(after, false), *sphere, kTolerance);
+    ASSERT_TRUE(blunter.run(kPasses));
+    EXPECT_EQ(after.points, before.points);
+    EXPECT_LT(count_sharp(after), count_sharp(before));
+    expect_sound(after, *sphere, kTolerance);
+}
+
+TEST(Blunter, LeavesAMeshWithoutSharpTrianglesAlone) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    TriangleMesh mesh = support::icosphere(2);
+    const TriangleMesh before = mesh;
+    Blunter blunter(mesh.points, mesh.triangles, all_of(mesh, true), *sphere, kTolerance);
+    EXPECT_FALSE(blunter.run(kPasses));
+    EXPECT_EQ(mesh.triangles, before.triangles);
+    EXPECT_EQ(mesh.points, before.points);
+}
+
+TEST(Blunter, KeepsTheTolerance) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const TriangleMesh before = rough_sphere();
+    double largest = 0.0;
+    for (const TriangleError& e : triangle_errors(before.points, before.triangles, *sphere, 6))
+        largest = std::max(largest, e.largest);
+    TriangleMesh strict = before, loose = before;
+    Blunter strictly(strict.points, strict.triangles, all_of(strict, true), *sphere, 0.5 * largest);
+    Blunter loosely(loose.points, loose.triangles, all_of(loose, true), *sphere, 2.0 * largest);
+    ASSERT_TRUE(strictly.run(kPasses));
+    ASSERT_TRUE(loosely.run(kPasses));
+    EXPECT_LT(strictly.changes().size(), loosely.changes().size());
+    std::set<int> changed;
+    for (const Blunting& change : strictly.changes())
+        changed.insert(change.triangle.begin(), change.triangle.end());
+    for (const int t : changed)
+        EXPECT_LE(triangle_errors(strict.points, {strict.triangles[t]}, *sphere, 6)[0].largest,
+                  0.5 * largest);
+}
+
+TEST(Blunter, CrossesNoOtherPartOfTheMesh) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    TriangleMesh free = rough_sphere();
+    Blunter unhindered(free.points, free.triangles, all_of(free, false), *sphere, kTolerance);
+    ASSERT_TRUE(unhindered.run(1));
+    // A crumb on the new diagonal of the first flip.
+    const auto first = unhindered.changes()[0];
+    const Triangle t = first.before[0], u = first.before[1];
+    const auto has = [](const Triangle& triangle, int v) {
+        return std::find(triangle.begin(), triangle.end(), v) != triangle.end();
+    };
+    Vec3 middle = Vec3::Zero();  // of the new diagonal
+    for (const int v : t)
+        if (!has(u, v)) middle += 0.5 * free.points[v];
+    for (const int v : u)
+        if (!has(t, v)) middle += 0.5 * free.points[v];
+    double apart = 1.0;  // from the planes of the triangles as they were
+    for (const Triangle& old : {t, u}) {
+        const Vec3& p = free.points[old[0]];
+        const Vec3 normal = (free.points[old[1]] - p).cross(free.points[old[2]] - p).normalized();
+        apart = std::min(apart, std::abs(normal.dot(middle - p)));
+    }
+    ASSERT_GT(apart, 1e-6);
+    const double size = 0.2 * apart;
+    TriangleMesh mesh =
+        support::join(rough_sphere(), support::tetrahedron(middle - Vec3::Constant(0.25 * size), size));
+    ASSERT_TRUE(self_intersections(mesh).empty());
+    Blunter blunter(mesh.points, mesh.triangles, all_of(mesh, false), *sphere, kTolerance);
+    ASSERT_TRUE(blunter.run(1));
+    EXPECT_TRUE(self_intersections(mesh).empty());
+    for (const Blunting& change : blunter.changes()) EXPECT_NE(change.triangle, first.triangle);
+}
+
+TEST(Blunter, TakesBackWhatIsNearAPlaceAndNothingElse) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const TriangleMesh before = rough_sphere();
+    TriangleMesh mesh = before;
+    Blunter blunter(mesh.points, mesh.triangles, all_of(mesh, true), *sphere, kTolerance);
+    ASSERT_TRUE(blunter.run(kPasses));
+    const std::size_t changes = blunter.changes().size();
+    ASSERT_GT(changes, 10u);
+    const int t = blunter.changes()[0].triangle[0];
+    const Vec3 place = mesh.points[mesh.triangles[t][0]];
+    ASSERT_TRUE(blunter.undo_near({place}, 1e-9));
+    EXPECT_LT(blunter.changes().size(), changes);
+    EXPECT_GT(blunter.changes().size(), changes / 2);
+    expect_sound(mesh, *sphere, kTolerance);
+    EXPECT_EQ(mesh.triangles[t], before.triangles[t]);
+    for (const int v : mesh.triangles[t]) {
+        bool moved_later = false;
+        for (const Blunting& change : blunter.changes()) moved_later = moved_later || change.vertex == v;
+        if (!moved_later) {
+            EXPECT_EQ(mesh.points[v], before.points[v]);
+        }
+    }
+    // A place that no change is near: all go.
+    while (!blunter.changes().empty()) ASSERT_TRUE(blunter.undo_near({Vec3(9, 9, 9)}, 1.0));
+    EXPECT_EQ(mesh.triangles, before.triangles);
+    EXPECT_EQ(mesh.points, before.points);
+    EXPECT_FALSE(blunter.undo_near({Vec3(9, 9, 9)}, 1.0));
+}
+
+}  // namespace
+}  // namespace isotrack
