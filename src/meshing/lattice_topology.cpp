@@ -9,6 +9,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "surface/ambiguous_faces.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -158,34 +159,65 @@ bool is_simple(std::uint32_t inside) {
 }
 
 /// Whether volumeToMesh joins an inside node with the one at `to`, inside as well: through a face always;
-/// across the diagonal of a face whose other two nodes are outside unless both cells that share the face hold
-/// no more inside nodes than these two and one next to one of them; never across a cell. `inside`: of the
-/// nodes around the first, as above. Nodes that are joined through a third one are so anyway.
+/// across the diagonal of a face whose other two nodes are outside sometimes; never across a cell. `inside`:
+/// of the nodes around the first, as above. Nodes that are joined through a third one are so anyway.
 bool is_joined(std::uint32_t inside, const Node& to) {
-    const auto in = [&](const Node& n) { return (inside >> bit_of(n[0], n[1], n[2]) & 1u) != 0; };
     const auto axes = 3 - std::count(to.begin(), to.end(), 0);
     if (axes != 2) return axes == 1;
     const auto off = static_cast<int>(std::find(to.begin(), to.end(), 0) - to.begin());  // across the face
-    bool few = true;
-    for (const int side : {-1, 1}) {
-        int beside_ends = 0, beside_others = 0;
-        for (const int first : {0, 1})
-            for (const int second : {0, 1}) {
-                Node n;
-                n[off] = side;
-                n[(off + 1) % 3] = first * to[(off + 1) % 3];
-                n[(off + 2) % 3] = second * to[(off + 2) % 3];
-                (first == second ? beside_ends : beside_others) += in(n);
-            }
-        few = few && beside_ends <= 1 && beside_others == 0;
+    return joins_diagonal([&](int side, int first, int second) {
+        Node n;
+        n[off] = 2 * side - 1;
+        n[(off + 1) % 3] = first * to[(off + 1) % 3];
+        n[(off + 2) % 3] = second * to[(off + 2) % 3];
+        return (inside >> bit_of(n[0], n[1], n[2]) & 1u) != 0;
+    });
+}
+
+/// Whether a segment from p to q crosses a triangle, by the signs of volumes: an edge that the segment
+/// touches counts for one of its triangles.
+bool crosses(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
+    const Vec3 d = q - p, normal = (b - a).cross(c - a);
+    if ((normal.dot(p - a) < 0.0) == (normal.dot(q - a) < 0.0)) return false;
+    const bool ab = d.dot((a - p).cross(b - p)) < 0.0, bc = d.dot((b - p).cross(c - p)) < 0.0,
+               ca = d.dot((c - p).cross(a - p)) < 0.0;
+    return ab == bc && bc == ca;
+}
+
+double low_x(const Surface::Diagonal& d) {
+    return std::min(d.from.x(), d.to.x());
+}
+
+/// Those of the diagonals, ascending by their low x, that the mesh crosses twice or more often.
+std::vector<Surface::Diagonal> parted_diagonals(const std::vector<Vec3>& points,
+                                                const std::vector<Triangle>& triangles,
+                                                const std::vector<Surface::Diagonal>& diagonals) {
+    std::vector<Surface::Diagonal> result;
+    if (diagonals.empty()) return result;
+    double longest = 0.0;
+    for (const auto& d : diagonals) longest = std::max(longest, (d.to - d.from).norm());
+    std::vector<int> crossed(diagonals.size(), 0);
+    for (const Triangle& t : triangles) {
+        const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+        const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
+        auto d = std::lower_bound(diagonals.begin(), diagonals.end(), low.x() - longest,
+                                  [](const auto& diagonal, double x) { return low_x(diagonal) < x; });
+        for (; d != diagonals.end() && low_x(*d) <= high.x(); ++d)
+            if ((d->from.cwiseMin(d->to).array() <= high.array()).all() &&
+                (d->from.cwiseMax(d->to).array() >= low.array()).all())
+                crossed[d - diagonals.begin()] += crosses(d->from, d->to, a, b, c);
     }
-    return !few;
+    for (std::size_t i = 0; i < diagonals.size(); ++i)
+        if (crossed[i] > 0 && crossed[i] % 2 == 0) result.push_back(diagonals[i]);
+    return result;
 }
 
 }  // namespace
 
 LatticeSides::LatticeSides(const Surface& surface, const std::vector<Surface::Crossing>& crossings)
-    : surface_(surface) {
+    : surface_(surface), diagonals_(surface.diagonals()) {
+    std::stable_sort(diagonals_.begin(), diagonals_.end(),
+                     [](const auto& a, const auto& b) { return low_x(a) < low_x(b); });
     const Eigen::Affine3d lattice = surface.lattice(), to_lattice = lattice.inverse();
     const auto probe = surface.probe();
     for (const auto& c : crossings) {
@@ -336,6 +368,7 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
     }
     for (std::size_t w = 0; w < wrong.size(); ++w)
         if (!put_right[w]) result.faults.push_back(lattice * Vec3(wrong[w][0], wrong[w][1], wrong[w][2]));
+    result.parted = parted_diagonals(points, triangles, sides.diagonals());
     return result;
 }
 

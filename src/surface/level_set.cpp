@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "isotrack/error.h"
+#include "surface/ambiguous_faces.h"
 
 namespace isotrack {
 namespace {
@@ -116,7 +117,10 @@ public:
         double planes[2];
         for (int i = 0; i < 2; ++i)
             planes[i] = mix(mix(v[i][0][0], v[i][0][1], t.z()), mix(v[i][1][0], v[i][1][1], t.z()), t.y());
-        return mix(planes[0], planes[1], t.x());
+        const double trilinear = mix(planes[0], planes[1], t.x());
+        if (!has_ambiguous_face(v)) return trilinear;
+        return trilinear +
+               joining_correction([&](int i, int j, int k) { return nodes_.at(base.offsetBy(i, j, k)); }, t);
     }
 
     /// Trilinear value, and the trilinear interpolation of the central differences at the corners, per voxel.
@@ -139,10 +143,21 @@ public:
                                              w[1][1] * (v[a + 1][3][b + 1] - v[a + 1][1][b + 1]));
             }
         result.gradient *= 0.5;
+        const float corners[2][2][2] = {{{v[1][1][1], v[1][1][2]}, {v[1][2][1], v[1][2][2]}},
+                                        {{v[2][1][1], v[2][1][2]}, {v[2][2][1], v[2][2][2]}}};
+        if (has_ambiguous_face(corners))
+            result.value +=
+                joining_correction([&](int i, int j, int k) { return v[i + 1][j + 1][k + 1]; }, t);
         return result;
     }
 
 private:
+    static bool has_ambiguous_face(const float (&corners)[2][2][2]) {
+        unsigned inside = 0;
+        for (unsigned c = 0; c < 8; ++c)
+            inside |= static_cast<unsigned>(corners[c >> 2][c >> 1 & 1][c & 1] < 0.0f) << c;
+        return kHasAmbiguousFace[inside];
+    }
     static Coord split(const Vec3& index, Vec3& t) {
         // Points far outside any grid, or not finite, read the background at a corner of the representable
         // range.
@@ -527,6 +542,43 @@ std::vector<Surface::Crossing> LevelSet::crossings() const {
                          (edge.outward ? 1.0f : -1.0f) * along.cast<float>()};
         }
     });
+    return result;
+}
+std::vector<Surface::Diagonal> LevelSet::diagonals() const {
+    // Each face with a diagonal has four crossed edges; it is found at the one that begins at its lowest node
+    // along the lower of its axes.
+    NodeValues nodes(impl_->grid->constTree());
+    std::vector<Diagonal> result;
+    for (const CrossedEdge& edge : impl_->crossed)
+        for (int other = edge.axis + 1; other < 3; ++other) {
+            const auto corner = [&](int out, int u, int w) {
+                Coord c = edge.from;
+                c[edge.axis] += u;
+                c[other] += w;
+                c[3 - edge.axis - other] += out;
+                return c;
+            };
+            const auto value = [&](int out, int u, int w) { return nodes.at(corner(out, u, w)); };
+            const auto is_inside = [&](int out, int u, int w) { return value(out, u, w) < 0.0f; };
+            if (is_inside(0, 0, 1) == edge.outward || is_inside(0, 1, 1) != edge.outward) continue;
+            const int turned = !edge.outward;
+            const bool joined = joins_diagonal(
+                [&](int side, int u, int w) { return is_inside(side == 0 ? -1 : 1, turned ? 1 - u : u, w); });
+            const int first =
+                joined ? turned : 1 - turned;  // the joined nodes are (first, 0) and (1 - first, 1)
+            const auto place = [&](int u, int w) {
+                const Coord c = corner(0, u, w);
+                return impl_->map.to_world(Vec3(c.x(), c.y(), c.z()));
+            };
+            Diagonal diagonal{place(first, 0), place(1 - first, 1), {}};
+            const Vec3 middle = 0.5 * (diagonal.from + diagonal.to);
+            const double between = 0.5 * (value(0, first, 0) + value(0, 1 - first, 1));
+            for (int w = 0; w < 2; ++w) {
+                const int u = w == 0 ? 1 - first : first;
+                diagonal.beside[w] = middle + between / (between - value(0, u, w)) * (place(u, w) - middle);
+            }
+            result.push_back(diagonal);
+        }
     return result;
 }
 bool LevelSet::empty() const {

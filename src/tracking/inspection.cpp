@@ -10,11 +10,11 @@ namespace isotrack {
 namespace {
 
 constexpr int kSteps = 6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
-constexpr double kSuspect = 0.6;      // of the tolerance: above it a triangle's largest error is searched for
-constexpr double kCertified = 0.98;   // of the tolerance: so that samples at other places find it kept, too
-constexpr double kLostAt = 3.0;       // tolerances
-constexpr double kFaultReach = 1.5;   // resolutions
-constexpr double kVainSpacing = 0.4;  // resolutions
+constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's largest error is searched for
+constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
+constexpr double kLostAt = 3.0;      // tolerances
+constexpr double kFaultReach = 1.5;  // resolutions
+constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
 constexpr double kLargestCotangent = 2.4751, kLargestFittedCotangent = 3.0777;  // of 22 and 18 degrees
 constexpr double kSmooth =
     0.45;  // cosine between the normals of a triangle's corners, for its angles to matter
@@ -182,8 +182,21 @@ void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspectio
 void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {
     if (!sides_) sides_.emplace(surface_, crossings_.crossings());
     inspection.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, *sides_);
-    doubt(inspection.topology.faults, fault_spacing_, inspection);
-    fault_spacing_ = kVainSpacing;
+    doubt(inspection.topology.faults, looks_ == 0 ? kFaultSpacing : kVainSpacing, inspection);
+    if (looks_ <= 1) {
+        std::vector<Vec3> places;
+        for (std::size_t t = 0; t < inspection.topology.speck.size(); ++t) {
+            const auto& [i, j, k] = mesh.carved.triangles[t];
+            if (inspection.topology.speck[t])
+                places.push_back((mesh.vertices[i] + mesh.vertices[j] + mesh.vertices[k]) / 3.0);
+        }
+        doubt(places, kVainSpacing, inspection);
+    }
+    if (looks_ == 0)  // what is not mended then seldom is
+        for (const auto& diagonal : inspection.topology.parted)
+            for (const Vec3& place : diagonal.beside)
+                inspection.doubtful.push_back({place, kFaultSpacing * surface_.resolution()});
+    ++looks_;
 }
 
 std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspection, const Tetrahedra& cells,

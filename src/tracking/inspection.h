@@ -65,7 +65,7 @@ private:
     std::vector<Facet> reached_;         // of the last inspection of the crossings
     std::vector<double> distances_;      // to them, per crossing
     std::optional<LatticeSides> sides_;
-    double fault_spacing_ = 0.8;         // resolutions; less from the second look on
+    int looks_ = 0;  // at the topology
 };
 
 /// Where particles are missing: at the dual crossings of triangles with too large an error or, where the
@@ -79,8 +79,8 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
 void report(const FrameMesh& mesh, const Inspection& inspection, const SizingLimits& limits,
             TrackedFrame& frame);
 
-/// Takes components without a lattice node off the mesh just inspected, but for those that stand for crossings
-/// which nothing else stands for.
+/// Takes components without a lattice node off the mesh just inspected, but for those that stand for
+/// crossings which nothing else stands for.
 void remove_specks(FrameMesh& mesh, Inspection& inspection, Inspector& inspector, const SizingLimits& limits);
 
 }  // namespace isotrack

@@ -18,6 +18,8 @@ struct LatticeTopology {
     /// void. Also all nodes of a component that volumeToMesh parts from others it touches across an edge or a
     /// corner, where the mesh has none of them. World positions, in the order of the nodes.
     std::vector<Vec3> faults;
+    /// Diagonals of the surface that the mesh crosses twice or more often: it parts what they join.
+    std::vector<Surface::Diagonal> parted;
     /// Per triangle: it belongs to a component that holds no node on its own. No such thing is in a grid.
     std::vector<char> speck;
 };
@@ -36,6 +38,8 @@ public:
     LatticeSides(const Surface& surface, const std::vector<Surface::Crossing>& crossings);
 
     const Surface& surface() const { return surface_; }
+    /// The surface's, ascending in the least x of their nodes.
+    const std::vector<Surface::Diagonal>& diagonals() const { return diagonals_; }
     /// Along the lines, halfway between the two nodes of each crossed edge; ascending in x, y and z.
     const std::vector<LineHit>& hits() const { return hits_; }
     /// Those of one line.
@@ -43,6 +47,7 @@ public:
 
 private:
     const Surface& surface_;
+    std::vector<Surface::Diagonal> diagonals_;
     std::vector<LineHit> hits_;
     std::vector<std::size_t> first_;  // of each x from the least
 };

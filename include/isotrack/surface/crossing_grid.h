@@ -20,7 +20,8 @@ public:
 
     const std::vector<Surface::Crossing>& crossings() const { return crossings_; }
 
-    /// Calls `visit` with the index of every crossing in `box`; of those in columns that are set only, if given.
+    /// Calls `visit` with the index of every crossing in `box`; of those in columns that are set only, if
+    /// given.
     template <typename Visit>
     void for_each_in(const Box& box, const Visit& visit, const std::vector<char>* columns = nullptr) const {
         int from[2], to[2];
@@ -34,10 +35,9 @@ public:
                 const std::size_t at = static_cast<std::size_t>(x) * count_[1] + y;
                 if (columns && !(*columns)[at]) continue;
                 const auto end = crossings_.begin() + static_cast<std::ptrdiff_t>(first_[at + 1]);
-                auto c = std::lower_bound(crossings_.begin() + static_cast<std::ptrdiff_t>(first_[at]), end,
-                                          box.min().z(), [](const Surface::Crossing& crossing, double z) {
-                                              return crossing.point.z() < z;
-                                          });
+                auto c = std::lower_bound(
+                    crossings_.begin() + static_cast<std::ptrdiff_t>(first_[at]), end, box.min().z(),
+                    [](const Surface::Crossing& crossing, double z) { return crossing.point.z() < z; });
                 for (; c != end && c->point.z() <= box.max().z(); ++c)
                     if (c->point.x() >= box.min().x() && c->point.x() <= box.max().x() &&
                         c->point.y() >= box.min().y() && c->point.y() <= box.max().y())

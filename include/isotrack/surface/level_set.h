@@ -18,13 +18,15 @@ struct LevelSetOptions {
 
 /// The level set of a FloatGrid or DoubleGrid.
 ///
-/// Values are trilinear. Gradients are the trilinear interpolation of central differences at the nodes:
-/// continuous, second order. Any linear transform is understood; gradients and distances are of the world.
-/// Values that are distances in voxels (measured at the surface) are turned into world units. Inside and
-/// outside are known everywhere: inactive voxels and tiles carry a sign, a background of zero means outside,
-/// NaN and infinity mean outside, minus infinity inside, and a surface that runs into the border of its
-/// voxels is closed there by a flat cap one voxel beyond the last of them, where volumeToMesh would put it.
-/// Immutable after construction; const members may be called from any number of threads.
+/// Values are trilinear, but for faces of lattice cells whose two inside nodes are across a diagonal: those
+/// are joined where volumeToMesh joins them, so that the surface has its topology. Gradients are the
+/// trilinear interpolation of central differences at the nodes: continuous, second order. Any linear
+/// transform is understood; gradients and distances are of the world. Values that are distances in voxels
+/// (measured at the surface) are turned into world units. Inside and outside are known everywhere: inactive
+/// voxels and tiles carry a sign, a background of zero means outside, NaN and infinity mean outside, minus
+/// infinity inside, and a surface that runs into the border of its voxels is closed there by a flat cap one
+/// voxel beyond the last of them, where volumeToMesh would put it. Immutable after construction; const
+/// members may be called from any number of threads.
 class LevelSet : public Surface {
 public:
     /// \throws InputError if the grid is neither float nor double, if its transform is not linear, or if it
@@ -44,6 +46,7 @@ public:
     /// meets the border.
     bool at_border(const Vec3& p) const override;
     std::vector<Crossing> crossings() const override;
+    std::vector<Diagonal> diagonals() const override;
 
     /// True when there is no surface: no sign change between neighbouring voxels.
     bool empty() const;

@@ -80,6 +80,16 @@ public:
     /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
     /// in the same order. This default scans `bounds()`.
     virtual std::vector<Crossing> crossings() const;
+
+    /// Two nodes of `lattice()` on one side of the surface, joined across the diagonal of a face whose other
+    /// two nodes are on the other side.
+    struct Diagonal {
+        Vec3 from, to;   ///< The nodes; the surface does not pass between them.
+        Vec3 beside[2];  ///< Where it crosses the face's other diagonal.
+    };
+
+    /// Those of a surface that says how nodes are joined; this default has none.
+    virtual std::vector<Diagonal> diagonals() const { return {}; }
 };
 
 }  // namespace isotrack

@@ -1,0 +1,73 @@
+// Faces of lattice cells whose two inside nodes are across a diagonal: which two nodes hang together.
+#pragma once
+
+#include <algorithm>
+#include <array>
+
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// Whether volumeToMesh joins the inside nodes of such a face, by its tables: unless both cells that share
+/// the face hold no more inside nodes than these two and one next to one of them. `inside(side, u, w)`: of
+/// the nodes one step off the face, on either side (0, 1); the inside nodes of the face are at u = w = 0 and
+/// u = w = 1.
+template <typename Inside>
+bool joins_diagonal(const Inside& inside) {
+    for (const int side : {0, 1}) {
+        const int beside_ends = inside(side, 0, 0) + inside(side, 1, 1),
+                  beside_others = inside(side, 0, 1) + inside(side, 1, 0);
+        if (beside_ends > 1 || beside_others > 0) return true;
+    }
+    return false;
+}
+
+/// Whether a cell has such a face, by the corners that are inside: bit 4 i + 2 j + k.
+inline const std::array<bool, 256> kHasAmbiguousFace = [] {
+    std::array<bool, 256> result{};
+    for (unsigned mask = 0; mask < 256; ++mask)
+        for (const auto& [a, b, c] : {std::array{1u, 2u, 4u}, std::array{2u, 4u, 1u}, std::array{4u, 1u, 2u}})
+            for (const unsigned side : {0u, a}) {
+                const auto inside = [&](unsigned corner) { return (mask >> (side + corner) & 1u) != 0; };
+                if (inside(0) == inside(b + c) && inside(b) == inside(c) && inside(0) != inside(b))
+                    result[mask] = true;
+            }
+    return result;
+}();
+
+/// What makes the trilinear value at t in such a cell join what volumeToMesh joins. Where they differ a face
+/// is interpolated on the two triangles along the diagonal of what is joined instead; into the cell that
+/// fades away linearly. 0 on the edges, continuous across faces. `at(i, j, k)`: the value at a node, the
+/// corners being 0 or 1; one step further out is asked for, too.
+template <typename At>
+double joining_correction(const At& at, const Vec3& t) {
+    double sum = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+        const auto node = [&](int out, int u, int w) {
+            int i[3];
+            i[axis] = out;
+            i[b] = u;
+            i[c] = w;
+            return static_cast<double>(at(i[0], i[1], i[2]));
+        };
+        for (const int side : {0, 1}) {
+            const int turned = !(node(side, 0, 0) < 0.0);  // u counts from the other end
+            const double in0 = node(side, turned, 0), in1 = node(side, 1 - turned, 1),
+                         out0 = node(side, 1 - turned, 0), out1 = node(side, turned, 1);
+            if (!(in0 < 0.0 && in1 < 0.0 && out0 >= 0.0 && out1 >= 0.0)) continue;
+            const bool joined = joins_diagonal([&](int beyond, int u, int w) {
+                return node(beyond == 0 ? side - 1 : side + 1, turned ? 1 - u : u, w) < 0.0;
+            });
+            // Whether the trilinear value keeps its sign on the diagonal.
+            const double out = out0 + out1, in = in0 + in1;
+            if (joined ? out * out < 4.0 * in0 * in1 : in * in < 4.0 * out0 * out1) continue;
+            const double u = turned ? 1.0 - t[b] : t[b], w = joined ? t[c] : 1.0 - t[c],
+                         nearness = side == 0 ? 1.0 - t[axis] : t[axis], bulge = joined ? out - in : in - out;
+            sum -= nearness * bulge * std::min(u, w) * (1.0 - std::max(u, w));
+        }
+    }
+    return sum;
+}
+
+}  // namespace isotrack
