@@ -191,7 +191,6 @@ void carve_labels(benchmark::State& state, const Scene& s) {
     for (auto _ : state) carved = carve(s.cells, labels, s.particles.position);
     count_items(state, s.particles.size());
     state.counters["complex_edges"] = static_cast<double>(carved.complex_edges.size());
-    state.counters["unused"] = static_cast<double>(carved.unused.size());
     const std::vector<double> angles = smallest_angles(s.mesh);
     state.counters["min_angle"] = *std::min_element(angles.begin(), angles.end());
 }

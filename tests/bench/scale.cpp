@@ -1,0 +1,208 @@
+// What frames cost as grids and meshes grow. scale.sh makes tables of it.
+//
+//     isotrack_scale write folder --voxel 0.004 --frames 4
+//     isotrack_scale track folder --tolerance 0.002 --measure 2
+//
+// The surface is a sphere with bumps that travel around it while it drifts, the same at any voxel size.
+#include <fmt/format.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/VolumeToMesh.h>
+#include <tbb/global_control.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "cli/table.h"
+#include "isotrack/error.h"
+#include "isotrack/io/sequence.h"
+#include "isotrack/io/vdb_file.h"
+#include "isotrack/surface/level_set.h"
+#include "isotrack/surface/rasterise.h"
+#include "isotrack/surface/shapes.h"
+#include "isotrack/tracking/tracker.h"
+
+namespace isotrack::bench {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kRadius = 0.35, kHeight = 0.01, kWavelength = 0.1;
+
+shapes::SurfacePtr bumpy_sphere(int frame, double voxel) {
+    constexpr double kDrift = 0.002, kTravel = 0.0025;  // per frame
+    constexpr double k = 2.0 * kPi / kWavelength, kSteepest = 1.0 + k * kHeight;
+    // Within so many voxels the value is the distance to first order but where the slope is low, beyond them
+    // never more than the distance: no block of the band may seem to be farther than its diagonal.
+    constexpr double kNear = 5.0, kLowSlope = 0.6;
+    const Vec3 centre(0.5 + kDrift * frame, 0.5, 0.5);
+    const Vec3 phase(k * kTravel * frame, 0.0, 0.0);
+    const auto value = [=](const Vec3& p) {
+        const Vec3 way = p - centre;
+        const Eigen::Array3d at = k * way + phase, s = at.sin(), c = at.cos();
+        const double length = way.norm(), f = length - kRadius - kHeight * s.prod();
+        if (!(std::abs(f) < kNear * voxel)) return f / kSteepest;
+        const Vec3 waves(c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]);
+        return f / std::max(kLowSlope, (way / length - k * kHeight * waves).norm());
+    };
+    const Vec3 reach = Vec3::Constant(kRadius + kHeight);
+    return shapes::from_function(value, Box(centre - reach, centre + reach), voxel);
+}
+
+struct WriteArguments {
+    std::string folder;
+    double voxel = 0.0, per_diagonal = 0.0;
+    int frames = 4;
+};
+
+int write(const WriteArguments& arguments) {
+    const double voxel = arguments.per_diagonal > 0.0
+                             ? bumpy_sphere(0, 1.0)->bounds().diagonal().norm() / arguments.per_diagonal
+                             : arguments.voxel;
+    std::filesystem::create_directories(arguments.folder);
+    for (int frame = 0; frame < arguments.frames; ++frame) {
+        const openvdb::FloatGrid::Ptr grid = rasterise(*bumpy_sphere(frame, voxel), voxel);
+        grid->setName("surface");
+        openvdb::io::File(fmt::format("{}/frame.{:04}.vdb", arguments.folder, frame)).write({grid});
+    }
+    fmt::print("{}\n", voxel);
+    return 0;
+}
+
+template <typename Body>
+double seconds_of(const Body& body) {
+    const auto start = std::chrono::steady_clock::now();
+    body();
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// A line of /proc/self/status, MB; 0 where there is none.
+double memory_mb(const std::string& name) {
+    std::ifstream status("/proc/self/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.rfind(name + ":", 0) == 0) return std::stod(line.substr(name.size() + 1)) / 1024.0;
+    return 0.0;
+}
+
+/// The peak is from now on. Reading, which has the file and the grid in memory, is not to count.
+void reset_peak() {
+    std::ofstream("/proc/self/clear_refs") << 5;
+}
+
+struct TrackArguments {
+    std::string input;
+    double tolerance = 0.0;
+    std::size_t measure = 2;
+    int threads = 0;
+    bool peers = false;
+};
+
+double volume_to_mesh_seconds(const LevelSet& level_set, double adaptivity) {
+    return seconds_of([&] {
+        std::vector<openvdb::Vec3s> points;
+        std::vector<openvdb::Vec3I> triangles;
+        std::vector<openvdb::Vec4I> quads;
+        openvdb::tools::volumeToMesh(*level_set.grid(), points, triangles, quads, 0.0, adaptivity);
+    });
+}
+
+/// One row: means over the frames measured, seconds; memory is the largest of all frames.
+int track(const TrackArguments& arguments) {
+    const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    const tbb::global_control limit(
+        tbb::global_control::max_allowed_parallelism,
+        static_cast<std::size_t>(arguments.threads > 0 ? arguments.threads : cores));
+    const std::vector<InputFrame> input = find_frames({arguments.input}).frames;
+    TrackerOptions options;
+    options.tolerance = arguments.tolerance;
+    Tracker tracker(options);
+
+    Json row{{"voxels", 0.0}, {"particles", 0.0}, {"not_kept", 0.0}, {"seeded", 0.0},
+             {"read", 0.0},   {"advance", 0.0},   {"above_mb", 0.0}};
+    double grid_mb = 0.0;
+    const double measured = static_cast<double>(std::min(arguments.measure, input.size()));
+    for (std::size_t i = 0; i < input.size(); ++i) {
+        std::unique_ptr<LevelSet> level_set;
+        const double read = seconds_of([&] {
+            const std::string& path = input[i].path;
+            level_set = std::make_unique<LevelSet>(read_grid(path, choose_grid(list_grids(path), {}, path)));
+        });
+        if (i == 0) grid_mb = memory_mb("VmRSS");
+        reset_peak();
+        TrackedFrame frame;
+        const double advance = seconds_of([&] { frame = tracker.advance(*level_set); });
+        row["above_mb"] = std::max(row["above_mb"].get<double>(), memory_mb("VmHWM") - grid_mb);
+        if (i + arguments.measure < input.size()) continue;
+        const auto add = [&](const std::string& name, double value) {
+            row[name] = row.value(name, 0.0) + value / measured;
+        };
+        add("voxels", static_cast<double>(level_set->active_voxels()));
+        add("particles", static_cast<double>(frame.particles));
+        add("not_kept", frame.within_tolerance ? 0.0 : 1.0);
+        add("seeded", static_cast<double>(frame.seeded));
+        add("read", read);
+        add("advance", advance);
+        for (const auto& [stage, seconds] : frame.seconds) add(stage, seconds);
+        if (!arguments.peers) continue;
+        add("adaptive", volume_to_mesh_seconds(*level_set, 0.1));
+        add("uniform", volume_to_mesh_seconds(*level_set, 0.0));
+    }
+    fmt::print("{}", cli::format_table(Json::array({row}), cli::TableFormat::Csv));
+    return 0;
+}
+
+}  // namespace
+}  // namespace isotrack::bench
+
+int main(int argc, char** argv) {
+    using namespace isotrack::bench;
+    CLI::App app{"What frames cost as grids and meshes grow"};
+    app.require_subcommand(1);
+    int result = 0;
+
+    WriteArguments to_write;
+    auto* write_command = app.add_subcommand("write", "Write frames and print their voxel size");
+    write_command->add_option("folder", to_write.folder)->required();
+    auto* size = write_command->add_option_group("size")->require_option(1);
+    size->add_option("--voxel", to_write.voxel, "World units")->check(CLI::PositiveNumber);
+    size->add_option("--per-diagonal", to_write.per_diagonal, "Voxels per diagonal of the shape")
+        ->check(CLI::PositiveNumber);
+    write_command->add_option("--frames", to_write.frames)->check(CLI::PositiveNumber)->capture_default_str();
+    write_command->callback([&] { result = write(to_write); });
+
+    TrackArguments to_track;
+    auto* track_command = app.add_subcommand("track", "Follow frames, print a row of CSV about the last");
+    track_command->add_option("input", to_track.input)->required();
+    track_command->add_option("--tolerance", to_track.tolerance, "World units")
+        ->required()
+        ->check(CLI::PositiveNumber);
+    track_command->add_option("--measure", to_track.measure, "How many frames are measured: the last ones")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    track_command->add_option("--threads", to_track.threads, "0: one per core")->capture_default_str();
+    track_command->add_flag("--peers", to_track.peers, "OpenVDB's volumeToMesh on the same grids, too");
+    track_command->callback([&] { result = track(to_track); });
+
+    try {
+        openvdb::initialize();
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "{}\n", error.what());
+        return 1;
+    }
+    return result;
+}

@@ -1,0 +1,128 @@
+#!/usr/bin/env bash
+# Prints what a warm frame costs as the grid grows, with one thread and two, and as the mesh grows, and below each table the wanted
+# figures that are missed. The surface is a sphere with bumps that travel; a warm frame is the mean of the last two of four.
+# usage: scale.sh PROGRAM_DIR [--large] [VOXELS_PER_DIAGONAL...]
+# PROGRAM_DIR holds isotrack_scale. --large adds the row of 500 000 particles. Without VOXELS_PER_DIAGONAL: 256 512 1024 2048.
+set -euo pipefail
+program=$1/isotrack_scale
+shift
+large=0
+if [ "${1-}" = --large ]; then
+    large=1
+    shift
+fi
+[ $# -gt 0 ] || set -- 256 512 1024 2048
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# write SIZE...: frames to measure on, and their voxel size in $voxel.
+write() {
+    rm -rf "$work/frames"
+    voxel=$("$program" write "$work/frames" "$@")
+}
+# track OPTION...: names and values of the last frames into row.csv.
+track() {
+    "$program" track "$work/frames" "$@" >"$work/row.csv"
+}
+calculate() {
+    LC_ALL=C awk "BEGIN { print $1 }"
+}
+# evaluate [AWK_OPTION...] PROGRAM: the program finds the values of row.csv in value[name], those of its second row in second[name].
+evaluate() {
+    local program_text="${!#}"
+    LC_ALL=C awk -F, -v missed="$work/missed" "${@:1:$#-1}" '
+        function miss(bad, text) { if (bad) print "- " text >>missed }
+        NR == 1 { for (i = 1; i <= NF; i++) name[i] = $i }
+        NR == 2 { for (i = 1; i <= NF; i++) value[name[i]] = $i }
+        NR == 3 { for (i = 1; i <= NF; i++) second[name[i]] = $i }
+        '"$program_text" "$work/row.csv"
+}
+print_missed() {
+    if [ -s "$work/missed" ]; then
+        echo "Missed:"
+        cat "$work/missed"
+    else
+        echo "Missed: nothing."
+    fi
+    : >"$work/missed"
+}
+
+echo "Resolution, at the same tolerance in world units, half a voxel of 256 per diagonal; seconds."
+echo
+echo "| voxels per diagonal | active voxels | particles | read | cover | other stages | total | volumeToMesh, adaptivity 0.1 | 0 | total over 0.1 | over 0 | cover, ns per active voxel |"
+echo "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
+write --per-diagonal 256 --frames 1
+tolerance=$(calculate "0.5 * $voxel")
+for size in "$@"; do
+    write --per-diagonal "$size"
+    track --tolerance "$tolerance" --peers
+    least=$(cat "$work/least" 2>/dev/null || true)
+    evaluate -v size="$size" -v least="$least" -v least_file="$work/least" '
+        END {
+            total = value["read"] + value["advance"]; others = value["advance"] - value["cover"]
+            nanoseconds = 1e9 * value["cover"] / value["voxels"]
+            printf "| %d | %d | %d | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | %.2f | %.0f |\n", size, value["voxels"],
+                   value["particles"], value["read"], value["cover"], others, total, value["adaptive"], value["uniform"],
+                   total / value["adaptive"], total / value["uniform"], nanoseconds
+            miss(value["not_kept"] > 0, size ": tolerance not kept")
+            miss(nanoseconds > 30, sprintf("%d: cover %.0f ns per active voxel", size, nanoseconds))
+            if (least == "") print others >least_file
+            else miss(others > 1.1 * least, sprintf("%d: other stages take %.1f times what they take at the first size", size, others / least))
+            miss(size == 1024 && total > value["adaptive"], sprintf("%d: %.2f of volumeToMesh at adaptivity 0.1", size, total / value["adaptive"]))
+            miss(size == 2048 && total > value["uniform"], sprintf("%d: %.2f of volumeToMesh at adaptivity 0", size, total / value["uniform"]))
+        }'
+done
+echo
+echo "Wanted: cover at most 30 ns per active voxel; the time of the other stages does not grow (by no more than a tenth); the total below volumeToMesh's at adaptivity 0.1 from 1024 on, at adaptivity 0 from 2048 on."
+print_missed
+
+# Of this surface: particles times tolerance, and the voxel that leaves two of them between neighbours.
+size_for() {
+    write --voxel "$(calculate "0.55 / sqrt($1)")"
+    tolerance=$(calculate "11.5 / $1")
+}
+
+echo
+size_for 25000
+track --tolerance "$tolerance" --threads 1
+cp "$work/row.csv" "$work/one.csv"
+track --tolerance "$tolerance" --threads 2
+sed 1d "$work/one.csv" >>"$work/row.csv"
+evaluate '
+    function row(text, key,    times) {
+        if (!(key in second) || !(value[key] > 0)) return
+        times = second[key] / value[key]
+        printf "| %s | %.3f | %.3f | %.2f |\n", text, second[key], value[key], times
+        miss((key == "relax" || key == "certify" || key == "cover") && times < 1.6, sprintf("%s %.2f", text, times))
+    }
+    END {
+        printf "Threads, on %d particles; seconds.\n\n| stage | 1 thread | 2 threads | speed-up |\n|---|---:|---:|---:|\n", value["particles"]
+        count = split("read carry cover size relax delaunay convect fit certify blunt", stages, " ")
+        for (i = 1; i <= count; i++) row(stages[i], stages[i])
+        row("all but read", "advance")
+    }'
+echo
+echo "Wanted: a speed-up of 1.6 in relax, certify and cover."
+print_missed
+
+echo
+echo "Size, at about the same number of voxels between particles."
+echo
+echo "| particles | active voxels | tolerance, voxels | seconds, without read | particles per second | peak memory above the grid, bytes per particle |"
+echo "|---:|---:|---:|---:|---:|---:|"
+sizes="5000 16000 50000 160000"
+[ "$large" = 0 ] || sizes="$sizes 500000"
+for size in $sizes; do
+    size_for "$size"
+    track --tolerance "$tolerance"
+    evaluate -v tolerance="$(calculate "$tolerance / $voxel")" '
+        END {
+            printf "| %d | %d | %.2f | %.2f | %d | %d |\n", value["particles"], value["voxels"], tolerance, value["advance"],
+                   value["particles"] / value["advance"], 1048576 * value["above_mb"] / value["particles"]
+            miss(value["not_kept"] > 0, sprintf("%d particles: tolerance not kept", value["particles"]))
+        }'
+done
+echo
+print_missed
+echo
+echo "Measured on $(nproc) cores, $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)."
