@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kSeedDistance = 0.7;  // of the spacing: what a seed covers
 constexpr double kReach = 1.2;         // of the spacing: what a particle that is already there covers
+constexpr double kNear = 0.75;         // of the spacing: where most of that is
 constexpr double kOffPlane =
     0.5;  // of the reach: how far from a particle's tangent plane surface counts as its own
 // A lattice edge along the surface, up to this cosine, counts to either side where it crosses at the particle
@@ -37,23 +38,34 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     if (crossings.empty()) return 0;
     const double resolution = surface.resolution();
     std::vector<std::atomic<char>> covered(crossings.size());  // marked by several threads
-    const auto mark = [&](const Vec3& p, const Vec3& n, double reach) {
+    const auto mark = [&](const Vec3& p, const Vec3& n, double reach,
+                          const std::vector<char>* columns = nullptr) {
         reach =
             std::max(reach, 1.2 * resolution);  // a crossing lies within a cell's diagonal of its neighbours
         const double off_plane = std::max(kOffPlane * reach, 0.5 * resolution);
-        grid.for_each_in(Box(p - Vec3::Constant(reach), p + Vec3::Constant(reach)), [&](std::size_t c) {
+        const auto mark_one = [&](std::size_t c) {
             const Vec3 way = crossings[c].point - p;
             if (way.squaredNorm() > reach * reach || std::abs(n.dot(way)) >= off_plane) return;
             const double facing = n.dot(crossings[c].outward.cast<double>());
             if (facing > 0.0 ||
                 (facing > -kGrazing && way.squaredNorm() < kHere * resolution * kHere * resolution))
                 covered[c].store(1, std::memory_order_relaxed);
+        };
+        grid.for_each_in(Box(p - Vec3::Constant(reach), p + Vec3::Constant(reach)), mark_one, columns);
+    };
+    const auto mark_all = [&](double share, const std::vector<char>* columns) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, particles.size(), 64), [&](const auto& range) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i)
+                mark(particles.position[i], particles.normal[i], share * particles.spacing[i], columns);
         });
     };
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, particles.size(), 64), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i)
-            mark(particles.position[i], particles.normal[i], kReach * particles.spacing[i]);
-    });
+    if (particles.size() > 0) {
+        mark_all(kNear, nullptr);
+        std::vector<char> open(crossings.size());
+        for (std::size_t c = 0; c < crossings.size(); ++c) open[c] = !covered[c];
+        const std::vector<char> columns = grid.columns_of(open);
+        mark_all(kReach, &columns);
+    }
 
     std::vector<int> order;
     for (std::size_t c = 0; c < crossings.size(); ++c)
