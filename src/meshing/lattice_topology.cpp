@@ -301,29 +301,54 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
         int wrong[27];
     };
     std::vector<Around> around(wrong.size());
+    // The first wrong node from `node` on, which is not before `at` and seldom far.
+    const auto from = [&](std::vector<Node>::const_iterator at, const Node& node) {
+        std::ptrdiff_t step = 1;
+        while (wrong.end() - at > step && at[step] < node) {
+            at += step;
+            step *= 2;
+        }
+        return std::lower_bound(at, wrong.end() - at > step ? at + step : wrong.end(), node);
+    };
     ThreadProbes probes(surface);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, wrong.size(), 64), [&](const auto& range) {
         Surface::Probe& own_probe = probes.local();
-        for (std::size_t w = range.begin(); w < range.end(); ++w)
+        // The lines around a node, and the first of the wrong nodes that are not below: both only go up.
+        struct Line {
+            const LineHit *begin, *end;
+            bool known;  // it comes out where it went in
+            std::vector<Node>::const_iterator at;
+        };
+        Line lines[3][3];
+        for (std::size_t w = range.begin(); w < range.end(); ++w) {
+            const bool same_line =
+                w > range.begin() && wrong[w][0] == wrong[w - 1][0] && wrong[w][1] == wrong[w - 1][1];
             for (int x = -1; x <= 1; ++x)
                 for (int y = -1; y <= 1; ++y) {
                     const Node low = {wrong[w][0] + x, wrong[w][1] + y, wrong[w][2] - 1};
-                    const auto [begin, end] = sides.line(low[0], low[1]);
-                    const bool known = (end - begin) % 2 == 0;  // it comes out where it went in
-                    auto at = std::lower_bound(wrong.begin(), wrong.end(), low);
+                    Line& line = lines[x + 1][y + 1];
+                    if (!same_line) {
+                        std::tie(line.begin, line.end) = sides.line(low[0], low[1]);
+                        line.known = (line.end - line.begin) % 2 == 0;
+                        line.at = from(w > range.begin() ? line.at : wrong.cbegin(), low);
+                    }
+                    while (line.at != wrong.end() && *line.at < low) ++line.at;
+                    auto at = line.at;
                     for (int z = -1; z <= 1; ++z) {
                         const Node m = {low[0], low[1], wrong[w][2] + z};
-                        while (at != wrong.end() && *at < m) ++at;
-                        const bool is_wrong = at != wrong.end() && *at == m;
+                        const bool is_wrong = at != wrong.end() && !(m < *at);
                         const auto below =
-                            std::count_if(begin, end, [&](const LineHit& h) { return h.z < m[2]; });
-                        const bool inside =
-                            known ? below % 2 == 1 : own_probe.value(lattice * Vec3(m[0], m[1], m[2])) < 0.0;
+                            std::count_if(line.begin, line.end, [&](const LineHit& h) { return h.z < m[2]; });
+                        const bool inside = line.known
+                                                ? below % 2 == 1
+                                                : own_probe.value(lattice * Vec3(m[0], m[1], m[2])) < 0.0;
                         if (inside != is_wrong) around[w].inside |= 1u << bit_of(x, y, z);
                         around[w].wrong[bit_of(x, y, z)] =
                             is_wrong ? static_cast<int>(at - wrong.begin()) : -1;
+                        at += is_wrong;
                     }
                 }
+        }
     });
     // Inside nodes that hang together, none of them inside the mesh, are a component that is lost even where
     // a corner joins them to others.
