@@ -53,8 +53,10 @@ struct TrackerOptions {
 
 /// What became of one frame.
 struct TrackedFrame {
-    TriangleMesh mesh;  ///< Closed, oriented, 2-manifold; ids and velocities (displacement since the last
-                        ///< frame) per vertex.
+    /// Closed, oriented, 2-manifold; per vertex the id and the velocity (displacement since the last frame)
+    /// of its particle, beside which it may stand: moved by the fit, or along the surface where triangles
+    /// were sharp.
+    TriangleMesh mesh;
     std::size_t particles = 0;  ///< Vertices beyond these are copies that keep the mesh manifold.
     std::size_t born = 0, died = 0, seeded = 0, lost = 0;
     int sweeps = 0;             ///< Relaxation sweeps over all particles.
