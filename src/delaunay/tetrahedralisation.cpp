@@ -11,7 +11,7 @@ namespace {
 constexpr int kBroken = 2, kNotDelaunay = 1, kLimit = 4;
 
 /// What one change costs, in units of what building costs per vertex.
-constexpr double kInsertCost = 2.0, kRemoveCost = 10.0;
+constexpr double kInsertCost = 2.0, kRemoveCost = 6.0;
 
 /// What all strategies share: the true positions, and the DT that follows them.
 class Follower : public Tetrahedralisation {
