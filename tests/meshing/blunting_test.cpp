@@ -64,11 +64,18 @@ void expect_sound(const TriangleMesh& mesh, const Surface& surface, double toler
 constexpr int kPasses = 4;
 constexpr double kTolerance = 0.05;
 
-TEST(Blunter, MakesSharpTrianglesBlunterAndKeepsTheMeshSound) {
-    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+/// The mesh of the tests, as it was and as it becomes.
+struct RoughSphere : ::testing::Test {
+    const shapes::SurfacePtr sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
     const TriangleMesh before = rough_sphere();
     TriangleMesh after = before;
-    Blunter blunter(after.points, after.triangles, all_of(after, true), *sphere, kTolerance);
+    Blunter blunter(bool movable) {
+        return {after.points, after.triangles, all_of(after, movable), *sphere, kTolerance};
+    }
+};
+
+TEST_F(RoughSphere, GetsBlunterTrianglesAndStaysSound) {
+    Blunter blunter = this->blunter(true);
     ASSERT_TRUE(blunter.run(kPasses));
     ASSERT_GT(count_sharp(before), 20u);
     EXPECT_LT(count_sharp(after), count_sharp(before) / 4);
@@ -99,11 +106,8 @@ TEST(Blunter, KeepsTheHeightAboveTheSurface) {
     for (const Vec3& p : mesh.points) EXPECT_NEAR(p.norm(), 1.02, 1e-6);
 }
 
-TEST(Blunter, MovesNothingThatIsNotMovable) {
-    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
-    const TriangleMesh before = rough_sphere();
-    TriangleMesh after = before;
-    Blunter blunter(after.points, after.triangles, all_of(after, false), *sphere, kTolerance);
+TEST_F(RoughSphere, KeepsWhatIsNotMovableWhereItIs) {
+    Blunter blunter = this->blunter(false);
     ASSERT_TRUE(blunter.run(kPasses));
     EXPECT_EQ(after.points, before.points);
     EXPECT_LT(count_sharp(after), count_sharp(before));
@@ -173,32 +177,29 @@ TEST(Blunter, CrossesNoOtherPartOfTheMesh) {
     for (const Blunting& change : blunter.changes()) EXPECT_NE(change.triangle, first.triangle);
 }
 
-TEST(Blunter, TakesBackWhatIsNearAPlaceAndNothingElse) {
-    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
-    const TriangleMesh before = rough_sphere();
-    TriangleMesh mesh = before;
-    Blunter blunter(mesh.points, mesh.triangles, all_of(mesh, true), *sphere, kTolerance);
+TEST_F(RoughSphere, LosesWhatIsNearAPlaceAndNothingElse) {
+    Blunter blunter = this->blunter(true);
     ASSERT_TRUE(blunter.run(kPasses));
     const std::size_t changes = blunter.changes().size();
     ASSERT_GT(changes, 10u);
     const int t = blunter.changes()[0].triangle[0];
-    const Vec3 place = mesh.points[mesh.triangles[t][0]];
+    const Vec3 place = after.points[after.triangles[t][0]];
     ASSERT_TRUE(blunter.undo_near({place}, 1e-9));
     EXPECT_LT(blunter.changes().size(), changes);
     EXPECT_GT(blunter.changes().size(), changes / 2);
-    expect_sound(mesh, *sphere, kTolerance);
-    EXPECT_EQ(mesh.triangles[t], before.triangles[t]);
-    for (const int v : mesh.triangles[t]) {
+    expect_sound(after, *sphere, kTolerance);
+    EXPECT_EQ(after.triangles[t], before.triangles[t]);
+    for (const int v : after.triangles[t]) {
         bool moved_later = false;
         for (const Blunting& change : blunter.changes()) moved_later = moved_later || change.vertex == v;
         if (!moved_later) {
-            EXPECT_EQ(mesh.points[v], before.points[v]);
+            EXPECT_EQ(after.points[v], before.points[v]);
         }
     }
     // A place that no change is near: all go.
     while (!blunter.changes().empty()) ASSERT_TRUE(blunter.undo_near({Vec3(9, 9, 9)}, 1.0));
-    EXPECT_EQ(mesh.triangles, before.triangles);
-    EXPECT_EQ(mesh.points, before.points);
+    EXPECT_EQ(after.triangles, before.triangles);
+    EXPECT_EQ(after.points, before.points);
     EXPECT_FALSE(blunter.undo_near({Vec3(9, 9, 9)}, 1.0));
 }
 
