@@ -14,6 +14,7 @@ namespace isotrack {
 namespace {
 
 constexpr char kOutside = 0, kInside = 1, kFlat = 2;
+constexpr double kFar = 1.0;    // resolutions: a centroid that far from the surface is on the side it says
 constexpr double kClear = 0.5;  // length of the gradient: below it sheets are less than about a voxel apart
 
 /// The facet through which the flow leaves a cell: the circumcentre lies beyond it. -1 when the cell holds
@@ -58,7 +59,7 @@ void update_labels(CellLabels& labels, const std::vector<int>& changed, const Te
             const Vec3 e1 = points[v[1]] - p0, e2 = points[v[2]] - p0, e3 = points[v[3]] - p0;
             const Vec3 centroid = p0 + 0.25 * (e1 + e2 + e3);
             double value = probe.value(centroid);
-            if (one_sheet) {
+            if (one_sheet && std::abs(value) < kFar * surface.resolution()) {
                 Vec3 centre;
                 const bool flat = !circumcentre(e1, e2, e3, centre);
                 const double at_centre = flat ? 0.0 : probe.value(p0 + centre);
