@@ -9,13 +9,12 @@
 #include <numeric>
 #include <tuple>
 
+#include "meshing/contested_nodes.h"
 #include "surface/ambiguous_faces.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
-
-using Node = std::array<int, 3>;
 
 /// Triangles joined through common vertices. Components are numbered in the order of their first triangle.
 std::vector<int> component_of_triangles(std::size_t vertices, const std::vector<Triangle>& triangles,
@@ -36,70 +35,6 @@ std::vector<int> component_of_triangles(std::size_t vertices, const std::vector<
         result.push_back(n);
     }
     return result;
-}
-
-/// The lines run a hair beside the nodes, so that they miss the vertices and edges of meshes that are aligned
-/// with the lattice.
-constexpr double kBeside[2] = {1.3e-7, 2.9e-7};
-
-constexpr double kOnNode = 1e-6;  // lattice units
-
-/// Twice the signed area of pqr in the plane; of a shared edge pq both triangles get the same bits but for
-/// the sign.
-double area2(const Vec3& p, const Vec3& q, double x, double y) {
-    const bool swap = std::tie(p.x(), p.y(), p.z()) > std::tie(q.x(), q.y(), q.z());
-    const Vec3 &a = swap ? q : p, &b = swap ? p : q;
-    const double area = (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x());
-    return swap ? -area : area;
-}
-
-std::vector<LineHit> hits_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                             const std::vector<int>& component) {
-    constexpr std::size_t kBlock = 512;
-    std::vector<std::vector<LineHit>> blocks((triangles.size() + kBlock - 1) / kBlock);
-    const auto add_hits = [&](std::size_t t, std::vector<LineHit>& hits) {
-        const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]], &c = points[triangles[t][2]];
-        const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-        for (int x = static_cast<int>(std::ceil(low.x() - kBeside[0])); x + kBeside[0] <= high.x(); ++x)
-            for (int y = static_cast<int>(std::ceil(low.y() - kBeside[1])); y + kBeside[1] <= high.y(); ++y) {
-                const double px = x + kBeside[0], py = y + kBeside[1];
-                const double wa = area2(b, c, px, py), wb = area2(c, a, px, py), wc = area2(a, b, px, py);
-                if (!((wa > 0.0 && wb > 0.0 && wc > 0.0) || (wa < 0.0 && wb < 0.0 && wc < 0.0))) continue;
-                hits.push_back({x, y, component[t], (wa * a.z() + wb * b.z() + wc * c.z()) / (wa + wb + wc)});
-            }
-    };
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
-        const std::size_t end = std::min(triangles.size(), (block + 1) * kBlock);
-        for (std::size_t t = block * kBlock; t < end; ++t) add_hits(t, blocks[block]);
-    });
-    std::vector<LineHit> hits;
-    for (const auto& block : blocks) hits.insert(hits.end(), block.begin(), block.end());
-    return hits;
-}
-
-/// Sorts by x, then by `less`. Returns where each x begins, from the least on, and the end.
-template <typename Less>
-std::vector<std::size_t> sort_by_x(std::vector<LineHit>& hits, const Less& less) {
-    if (hits.empty()) return {};
-    const auto [low, high] = std::minmax_element(
-        hits.begin(), hits.end(), [](const LineHit& a, const LineHit& b) { return a.x < b.x; });
-    const int from = low->x;
-    std::vector<std::size_t> first(static_cast<std::size_t>(high->x - from) + 2, 0);
-    for (const LineHit& h : hits) ++first[h.x - from + 1];
-    for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
-    std::vector<std::size_t> end(first.begin(), first.end() - 1);
-    std::vector<LineHit> sorted(hits.size());
-    for (const LineHit& h : hits) sorted[end[h.x - from]++] = h;
-    hits.swap(sorted);
-    tbb::parallel_for(std::size_t{0}, first.size() - 1, [&](std::size_t i) {
-        std::sort(hits.begin() + static_cast<std::ptrdiff_t>(first[i]),
-                  hits.begin() + static_cast<std::ptrdiff_t>(first[i + 1]), less);
-    });
-    return first;
-}
-
-bool is_before(const LineHit& a, const LineHit& b) {
-    return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
 
 /// Sets of a node's 26 neighbours as bits; bit 9 (x + 1) + 3 (y + 1) + z + 1, the node itself is bit 13.
@@ -184,10 +119,6 @@ bool crosses(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const V
     return ab == bc && bc == ca;
 }
 
-double low_x(const Surface::Diagonal& d) {
-    return std::min(d.from.x(), d.to.x());
-}
-
 /// Those of the diagonals, ascending by their low x, that the mesh crosses twice or more often.
 std::vector<Surface::Diagonal> parted_diagonals(const std::vector<Vec3>& points,
                                                 const std::vector<Triangle>& triangles,
@@ -200,9 +131,10 @@ std::vector<Surface::Diagonal> parted_diagonals(const std::vector<Vec3>& points,
     for (const Triangle& t : triangles) {
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
         const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-        auto d = std::lower_bound(diagonals.begin(), diagonals.end(), low.x() - longest,
-                                  [](const auto& diagonal, double x) { return low_x(diagonal) < x; });
-        for (; d != diagonals.end() && low_x(*d) <= high.x(); ++d)
+        auto d = std::lower_bound(
+            diagonals.begin(), diagonals.end(), low.x() - longest,
+            [](const auto& diagonal, double x) { return std::min(diagonal.from.x(), diagonal.to.x()) < x; });
+        for (; d != diagonals.end() && d->from.cwiseMin(d->to).x() <= high.x(); ++d)
             if ((d->from.cwiseMin(d->to).array() <= high.array()).all() &&
                 (d->from.cwiseMax(d->to).array() >= low.array()).all())
                 crossed[d - diagonals.begin()] += crosses(d->from, d->to, a, b, c);
@@ -214,38 +146,6 @@ std::vector<Surface::Diagonal> parted_diagonals(const std::vector<Vec3>& points,
 
 }  // namespace
 
-LatticeSides::LatticeSides(const Surface& surface, const std::vector<Surface::Crossing>& crossings)
-    : surface_(surface), diagonals_(surface.diagonals()) {
-    std::stable_sort(diagonals_.begin(), diagonals_.end(),
-                     [](const auto& a, const auto& b) { return low_x(a) < low_x(b); });
-    const Eigen::Affine3d lattice = surface.lattice(), to_lattice = lattice.inverse();
-    const auto probe = surface.probe();
-    for (const auto& c : crossings) {
-        const Vec3 way = to_lattice.linear() * c.outward.cast<double>(), p = to_lattice * c.point;
-        if (std::abs(way.z()) < 0.5 * way.norm()) continue;
-        const Node nearest = {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y())),
-                              static_cast<int>(std::lround(p.z()))};
-        // The crossing counts in the middle between its two nodes; on a node rounding decides which those
-        // are.
-        const double beyond = p.z() - nearest[2];
-        const auto is_inside = [&] {
-            return probe->value(lattice * Vec3(nearest[0], nearest[1], nearest[2])) < 0.0;
-        };
-        const bool up = std::abs(beyond) > kOnNode ? beyond > 0.0 : is_inside() == (way.z() > 0.0);
-        hits_.push_back({nearest[0], nearest[1], 0, nearest[2] + (up ? 0.5 : -0.5)});
-    }
-    first_ = sort_by_x(hits_, is_before);
-}
-
-std::pair<const LineHit*, const LineHit*> LatticeSides::line(int x, int y) const {
-    const LineHit* none = nullptr;
-    if (hits_.empty() || x < hits_.front().x || x > hits_.back().x) return {none, none};
-    const std::size_t at = static_cast<std::size_t>(x - hits_.front().x);
-    const LineHit *begin = hits_.data() + first_[at], *end = hits_.data() + first_[at + 1];
-    begin = std::partition_point(begin, end, [&](const LineHit& h) { return h.y < y; });
-    return {begin, std::find_if(begin, end, [&](const LineHit& h) { return h.y != y; })};
-}
-
 LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                                  const LatticeSides& sides) {
     const Surface& surface = sides.surface();
@@ -255,45 +155,9 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
     for (const Vec3& p : points) in_lattice.push_back(to_lattice * p);
     int components = 0;
     const std::vector<int> component = component_of_triangles(points.size(), triangles, components);
-    std::vector<LineHit> hits = hits_of(in_lattice, triangles, component);
+    const auto [wrong, holds_node] = contested_nodes(in_lattice, triangles, component, components, sides);
     LatticeTopology result;
-
-    // Components with a node between two hits of their own.
-    sort_by_x(hits, [](const LineHit& a, const LineHit& b) {
-        return std::tie(a.component, a.y, a.z) < std::tie(b.component, b.y, b.z);
-    });
-    std::vector<char> holds_node(components, 0);
-    for (std::size_t h = 0; h + 1 < hits.size();) {
-        const LineHit &a = hits[h], &b = hits[h + 1];
-        if (std::tie(a.component, a.x, a.y) != std::tie(b.component, b.x, b.y)) {
-            ++h;  // an odd hit: the line grazes an edge
-            continue;
-        }
-        if (std::floor(b.z) >= a.z) holds_node[a.component] = 1;
-        h += 2;
-    }
-    result.speck.resize(triangles.size());
-    for (std::size_t t = 0; t < triangles.size(); ++t) result.speck[t] = !holds_node[component[t]];
-
-    // Mesh and surface cross each line at places of their own; between two of them the nodes are on the wrong
-    // side.
-    hits.erase(
-        std::remove_if(hits.begin(), hits.end(), [&](const LineHit& h) { return !holds_node[h.component]; }),
-        hits.end());
-    sort_by_x(hits, is_before);
-    std::vector<LineHit> both(hits.size() + sides.hits().size());
-    std::merge(hits.begin(), hits.end(), sides.hits().begin(), sides.hits().end(), both.begin(), is_before);
-    std::vector<Node> wrong;  // ascending
-    for (std::size_t h = 0; h + 1 < both.size();) {
-        const LineHit &a = both[h], &b = both[h + 1];
-        if (std::tie(a.x, a.y) != std::tie(b.x, b.y)) {
-            ++h;
-            continue;
-        }
-        for (int z = static_cast<int>(std::ceil(a.z)); z <= b.z; ++z)
-            if (wrong.empty() || wrong.back() < Node{a.x, a.y, z}) wrong.push_back({a.x, a.y, z});
-        h += 2;
-    }
+    for (const int c : component) result.speck.push_back(!holds_node[c]);
 
     // The sides of the nodes around each as the mesh has them, and which of those are wrong.
     struct Around {
@@ -315,7 +179,7 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
         Surface::Probe& own_probe = probes.local();
         // The lines around a node, and the first of the wrong nodes that are not below: both only go up.
         struct Line {
-            const LineHit *begin, *end;
+            LatticeSides::Uprights::Range crossed;
             bool known;  // it comes out where it went in
             std::vector<Node>::const_iterator at;
         };
@@ -328,8 +192,8 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
                     const Node low = {wrong[w][0] + x, wrong[w][1] + y, wrong[w][2] - 1};
                     Line& line = lines[x + 1][y + 1];
                     if (!same_line) {
-                        std::tie(line.begin, line.end) = sides.line(low[0], low[1]);
-                        line.known = (line.end - line.begin) % 2 == 0;
+                        line.crossed = sides.line(low[0], low[1]);
+                        line.known = (line.crossed.second - line.crossed.first) % 2 == 0;
                         line.at = from(w > range.begin() ? line.at : wrong.cbegin(), low);
                     }
                     while (line.at != wrong.end() && *line.at < low) ++line.at;
@@ -338,7 +202,8 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
                         const Node m = {low[0], low[1], wrong[w][2] + z};
                         const bool is_wrong = at != wrong.end() && !(m < *at);
                         const auto below =
-                            std::count_if(line.begin, line.end, [&](const LineHit& h) { return h.z < m[2]; });
+                            std::count_if(line.crossed.first, line.crossed.second,
+                                          [&](const LatticeSides::Upright& u) { return u.z < m[2]; });
                         const bool inside = line.known
                                                 ? below % 2 == 1
                                                 : own_probe.value(lattice * Vec3(m[0], m[1], m[2])) < 0.0;

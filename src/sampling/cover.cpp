@@ -18,9 +18,8 @@ constexpr double kOffPlane =
     0.5;  // of the reach: how far from a particle's tangent plane surface counts as its own
 // A lattice edge along the surface, up to this cosine, counts to either side where it crosses at the particle
 // itself.
-constexpr double kGrazing = 0.01, kHere = 0.1;  // kHere: resolutions
-constexpr double kLargestSeed =
-    5.0;  // resolutions: a first spacing above this would step over small features
+constexpr double kGrazing = 0.01, kHere = 0.1;  // kHere: spacings of the crossings
+constexpr double kLargestSeed = 5.0;  // spacings of the crossings: above it small features are stepped over
 
 /// A shuffled order that depends on the seed and the count alone [splitmix64].
 std::uint64_t mix(std::uint64_t x) {
@@ -36,19 +35,17 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
                   const SizingLimits& limits, std::uint64_t seed, Id& next_id) {
     const std::vector<Surface::Crossing>& crossings = grid.crossings();
     if (crossings.empty()) return 0;
-    const double resolution = surface.resolution();
+    const double spacing = grid.spacing();
     std::vector<std::atomic<char>> covered(crossings.size());  // marked by several threads
     const auto mark = [&](const Vec3& p, const Vec3& n, double reach,
                           const std::vector<char>* columns = nullptr) {
-        reach =
-            std::max(reach, 1.2 * resolution);  // a crossing lies within a cell's diagonal of its neighbours
-        const double off_plane = std::max(kOffPlane * reach, 0.5 * resolution);
+        reach = std::max(reach, 1.2 * spacing);  // a crossing lies within a cell's diagonal of its neighbours
+        const double off_plane = std::max(kOffPlane * reach, 0.5 * spacing);
         const auto mark_one = [&](std::size_t c) {
             const Vec3 way = crossings[c].point - p;
             if (way.squaredNorm() > reach * reach || std::abs(n.dot(way)) >= off_plane) return;
             const double facing = n.dot(crossings[c].outward.cast<double>());
-            if (facing > 0.0 ||
-                (facing > -kGrazing && way.squaredNorm() < kHere * resolution * kHere * resolution))
+            if (facing > 0.0 || (facing > -kGrazing && way.squaredNorm() < kHere * spacing * kHere * spacing))
                 covered[c].store(1, std::memory_order_relaxed);
         };
         grid.for_each_in(Box(p - Vec3::Constant(reach), p + Vec3::Constant(reach)), mark_one, columns);
@@ -80,11 +77,11 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
         if (covered[c]) continue;
         covered[c] = 1;
         const auto p = probe->project(crossings[c].point);
-        if (!p || (*p - crossings[c].point).norm() > 1.5 * resolution) continue;
+        if (!p || (*p - crossings[c].point).norm() > 1.5 * surface.resolution()) continue;
         const Vec3 n = probe->normal(*p);
         if (!(n.squaredNorm() > 0.0)) continue;
-        const double h = std::min(spacing_from_curvature(*probe, *p, n, resolution, limits),
-                                  std::max(kLargestSeed * resolution, limits.min_edge));
+        const double h = std::min(spacing_from_curvature(*probe, *p, n, spacing, limits),
+                                  std::max(kLargestSeed * spacing, limits.min_edge));
         particles.add(*p, n, h, next_id++);
         mark(*p, n, kSeedDistance * h);
         ++added;

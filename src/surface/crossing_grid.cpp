@@ -7,7 +7,8 @@
 
 namespace isotrack {
 
-CrossingGrid::CrossingGrid(std::vector<Surface::Crossing> crossings, double width) : width_(width) {
+CrossingGrid::CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
+    : spacing_(spacing), width_(2.0 * spacing) {
     constexpr double kColumnsPerCrossing = 4.0;
     if (crossings.empty()) return;
     Box box;

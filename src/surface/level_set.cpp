@@ -3,6 +3,7 @@
 #include <openvdb/tools/SignedFloodFill.h>
 #include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <atomic>
@@ -12,6 +13,7 @@
 
 #include "isotrack/error.h"
 #include "surface/ambiguous_faces.h"
+#include "surface/crossed_edges.h"
 
 namespace isotrack {
 namespace {
@@ -20,7 +22,6 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using Leaf = FloatTree::LeafNodeType;
-using Accessor = openvdb::tree::ValueAccessor<const FloatTree, false>;  // unregistered: the tree outlives it
 
 constexpr double kProjectionError = 1e-4;  // voxels; float values carry no more
 constexpr double kFarVoxels = 10.0;        // values are clamped to this many voxels
@@ -194,79 +195,6 @@ private:
     NodeValues nodes_;
 };
 
-/// A lattice edge that crosses the surface: from `from`, `fraction` of a voxel along `axis`.
-struct CrossedEdge {
-    Coord from;
-    float fraction;
-    std::int8_t axis;
-    bool outward;    ///< `from` is the end inside.
-    bool at_border;  ///< One end is an inactive voxel.
-
-    Vec3 index() const {
-        Vec3 p(from.x(), from.y(), from.z());
-        p[axis] += fraction;
-        return p;
-    }
-};
-
-/// Every edge with a sign change, leaf by leaf. Edges between two tiles are not seen: a level set has voxels
-/// at its surface.
-std::vector<CrossedEdge> find_crossings(const FloatTree& tree) {
-    const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
-    std::vector<std::vector<CrossedEdge>> per_leaf(leaves.leafCount());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.leafCount(), 16), [&](const auto& range) {
-        Accessor accessor(tree);
-        for (std::size_t n = range.begin(); n < range.end(); ++n) {
-            const Leaf& leaf = leaves.leaf(n);
-            const float* data = leaf.buffer().data();
-            const Coord origin = leaf.origin();
-            std::vector<CrossedEdge>& found = per_leaf[n];
-            const auto add = [&](const Coord& from, int axis, float a, float b) {
-                if ((a < 0.0f) == (b < 0.0f)) return;
-                const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
-                const bool border = !accessor.isValueOn(from) ||
-                                    !accessor.isValueOn(from.offsetBy(axis == 0, axis == 1, axis == 2));
-                found.push_back({from, fraction, static_cast<std::int8_t>(axis), a < 0.0f, border});
-            };
-            constexpr int kStride[3] = {kLeafDim * kLeafDim, kLeafDim, 1};
-            for (int i = 0; i < static_cast<int>(Leaf::SIZE); ++i) {
-                const Coord local(i / kStride[0], (i / kStride[1]) % kLeafDim, i % kLeafDim);
-                for (int axis = 0; axis < 3; ++axis)
-                    if (local[axis] < kLeafDim - 1 && (data[i] < 0.0f) != (data[i + kStride[axis]] < 0.0f))
-                        add(origin + local, axis, data[i], data[i + kStride[axis]]);
-            }
-            // Across the leaf's faces: upwards always, downwards only where no leaf sees the edge from below.
-            for (int axis = 0; axis < 3; ++axis) {
-                Coord below = origin;
-                below[axis] -= 1;
-                const bool open_below = accessor.probeConstLeaf(below) == nullptr;
-                const int u = (axis + 1) % 3, w = (axis + 2) % 3;
-                for (int a = 0; a < kLeafDim; ++a)
-                    for (int b = 0; b < kLeafDim; ++b) {
-                        Coord top = origin;
-                        top[u] += a;
-                        top[w] += b;
-                        Coord bottom = top;
-                        top[axis] += kLeafDim - 1;
-                        Coord beyond = top;
-                        beyond[axis] += 1;
-                        add(top, axis, leaf.getValue(top), accessor.getValue(beyond));
-                        if (!open_below) continue;
-                        Coord before = bottom;
-                        before[axis] -= 1;
-                        add(before, axis, accessor.getValue(before), leaf.getValue(bottom));
-                    }
-            }
-        }
-    });
-    std::vector<CrossedEdge> all;
-    std::size_t count = 0;
-    for (const auto& part : per_leaf) count += part.size();
-    all.reserve(count);
-    for (const auto& part : per_leaf) all.insert(all.end(), part.begin(), part.end());
-    return all;
-}
-
 /// Median length of the world gradient at the surface, away from the border; 0 when there is nothing to
 /// measure.
 double slope_at_surface(const FloatTree& tree, const AffineMap& map,
@@ -363,7 +291,7 @@ struct LevelSet::Impl {
     double reach = 0.0;
     std::size_t active_voxels = 0, border_crossings = 0;
     openvdb::GridBase::ConstPtr source;  // as it came
-    std::vector<CrossedEdge> crossed;
+    CrossedEdges crossed;
     Box bounds;
 
     Impl(const openvdb::GridBase::ConstPtr& as_it_came, const LevelSetOptions& options)
@@ -394,26 +322,33 @@ struct LevelSet::Impl {
             grid = floats;
         }
 
-        std::vector<CrossedEdge> found = find_crossings(grid->constTree());
-        if (found.empty() && active_voxels > 0 && grid_class != openvdb::GRID_LEVEL_SET)
+        CrossedEdges found = find_crossed_edges(grid->constTree());
+        if (found.edges.empty() && active_voxels > 0 && grid_class != openvdb::GRID_LEVEL_SET)
             throw InputError(
                 grid_label(*source) + " is not a level set: its values do not change sign around " +
                 std::to_string(options.iso) + " (class '" + openvdb::GridBase::gridClassToString(grid_class) +
                 "'); give an iso value inside its range");
-        scale = value_scale_for(slope_at_surface(grid->constTree(), map, found), map.voxel_size,
+        scale = value_scale_for(slope_at_surface(grid->constTree(), map, found.edges), map.voxel_size,
                                 grid_class == openvdb::GRID_LEVEL_SET);
         border_crossings = static_cast<std::size_t>(
-            std::count_if(found.begin(), found.end(), [](const auto& c) { return c.at_border; }));
+            std::count_if(found.edges.begin(), found.edges.end(), [](const auto& c) { return c.at_border; }));
 
         if (!own && scale != 1.0) grid = own = floats->deepCopy();
         if (own) {
             normalise(*own, source->getGridClass());
-            found = find_crossings(own->constTree());
+            found = find_crossed_edges(own->constTree());
         }
         const double background = grid->background();
         reach = std::clamp(background, map.voxel_size, kFarVoxels * map.voxel_size);
         crossed = std::move(found);
-        for (const CrossedEdge& edge : crossed) bounds.extend(map.to_world(edge.index()));
+        bounds = tbb::parallel_reduce(
+            tbb::blocked_range<std::size_t>(0, crossed.edges.size(), 4096), Box(),
+            [&](const auto& range, Box box) {
+                for (std::size_t e = range.begin(); e < range.end(); ++e)
+                    box.extend(map.to_world(crossed.edges[e].index()));
+                return box;
+            },
+            [](const Box& a, const Box& b) { return a.merged(b); });
     }
 
     bool is_active(const Coord& c) const {
@@ -479,6 +414,38 @@ struct LevelSet::Impl {
 
 namespace {
 
+/// The diagonal of the face that an edge and the one along the axis `other` span from the lower end of the
+/// edge, if all four of the face's edges are crossed. `other` is above the edge's axis: each face once.
+std::optional<Surface::Diagonal> diagonal_beyond(const CrossedEdge& edge, int other, NodeValues& nodes,
+                                                 const AffineMap& map) {
+    const auto corner = [&](int out, int u, int w) {
+        Coord c = edge.from;
+        c[edge.axis] += u;
+        c[other] += w;
+        c[3 - edge.axis - other] += out;
+        return c;
+    };
+    const auto value = [&](int out, int u, int w) { return nodes.at(corner(out, u, w)); };
+    const auto is_inside = [&](int out, int u, int w) { return value(out, u, w) < 0.0f; };
+    if (is_inside(0, 0, 1) == edge.outward || is_inside(0, 1, 1) != edge.outward) return std::nullopt;
+    const int turned = !edge.outward;
+    const bool joined = joins_diagonal(
+        [&](int side, int u, int w) { return is_inside(side == 0 ? -1 : 1, turned ? 1 - u : u, w); });
+    const int first = joined ? turned : 1 - turned;  // the joined nodes are (first, 0) and (1 - first, 1)
+    const auto place = [&](int u, int w) {
+        const Coord c = corner(0, u, w);
+        return map.to_world(Vec3(c.x(), c.y(), c.z()));
+    };
+    Surface::Diagonal diagonal{place(first, 0), place(1 - first, 1), {}};
+    const Vec3 middle = 0.5 * (diagonal.from + diagonal.to);
+    const double between = 0.5 * (value(0, first, 0) + value(0, 1 - first, 1));
+    for (int w = 0; w < 2; ++w) {
+        const int u = w == 0 ? 1 - first : first;
+        diagonal.beside[w] = middle + between / (between - value(0, u, w)) * (place(u, w) - middle);
+    }
+    return diagonal;
+}
+
 class GridProbe final : public Surface::Probe {
 public:
     GridProbe(const FloatTree& tree, const AffineMap& map)
@@ -532,11 +499,16 @@ bool LevelSet::at_border(const Vec3& p) const {
         if (!impl_->is_active(low.offsetBy(corner & 1, corner >> 1 & 1, corner >> 2))) return true;
     return false;
 }
-std::vector<Surface::Crossing> LevelSet::crossings() const {
-    std::vector<Crossing> result(impl_->crossed.size());
+std::vector<Surface::Crossing> LevelSet::crossings(double apart) const {
+    const std::vector<CrossedEdge>& edges = impl_->crossed.edges;
+    int cube = 1;
+    while (cube < kLeafDim && 2 * cube * resolution() <= apart) cube *= 2;
+    std::vector<std::size_t> some;
+    if (cube > 1) some = thin_out(impl_->crossed, cube);
+    std::vector<Crossing> result(cube > 1 ? some.size() : edges.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.size(), 4096), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            const CrossedEdge& edge = impl_->crossed[i];
+            const CrossedEdge& edge = edges[cube > 1 ? some[i] : i];
             const Vec3 along = impl_->map.linear.col(edge.axis).normalized();
             result[i] = {impl_->map.to_world(edge.index()),
                          (edge.outward ? 1.0f : -1.0f) * along.cast<float>()};
@@ -544,45 +516,29 @@ std::vector<Surface::Crossing> LevelSet::crossings() const {
     });
     return result;
 }
+std::vector<Eigen::Vector3i> LevelSet::upright_crossings() const {
+    std::vector<Eigen::Vector3i> result;
+    for (const CrossedEdge& edge : impl_->crossed.edges)
+        if (edge.axis == 2) result.emplace_back(edge.from.x(), edge.from.y(), edge.from.z());
+    return result;
+}
 std::vector<Surface::Diagonal> LevelSet::diagonals() const {
-    // Each face with a diagonal has four crossed edges; it is found at the one that begins at its lowest node
-    // along the lower of its axes.
-    NodeValues nodes(impl_->grid->constTree());
+    constexpr std::size_t kBlock = 16384;
+    const std::vector<CrossedEdge>& edges = impl_->crossed.edges;
+    std::vector<std::vector<Diagonal>> blocks((edges.size() + kBlock - 1) / kBlock);
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
+        NodeValues nodes(impl_->grid->constTree());
+        for (std::size_t e = block * kBlock; e < std::min(edges.size(), (block + 1) * kBlock); ++e)
+            for (int other = edges[e].axis + 1; other < 3; ++other)
+                if (const auto diagonal = diagonal_beyond(edges[e], other, nodes, impl_->map))
+                    blocks[block].push_back(*diagonal);
+    });
     std::vector<Diagonal> result;
-    for (const CrossedEdge& edge : impl_->crossed)
-        for (int other = edge.axis + 1; other < 3; ++other) {
-            const auto corner = [&](int out, int u, int w) {
-                Coord c = edge.from;
-                c[edge.axis] += u;
-                c[other] += w;
-                c[3 - edge.axis - other] += out;
-                return c;
-            };
-            const auto value = [&](int out, int u, int w) { return nodes.at(corner(out, u, w)); };
-            const auto is_inside = [&](int out, int u, int w) { return value(out, u, w) < 0.0f; };
-            if (is_inside(0, 0, 1) == edge.outward || is_inside(0, 1, 1) != edge.outward) continue;
-            const int turned = !edge.outward;
-            const bool joined = joins_diagonal(
-                [&](int side, int u, int w) { return is_inside(side == 0 ? -1 : 1, turned ? 1 - u : u, w); });
-            const int first =
-                joined ? turned : 1 - turned;  // the joined nodes are (first, 0) and (1 - first, 1)
-            const auto place = [&](int u, int w) {
-                const Coord c = corner(0, u, w);
-                return impl_->map.to_world(Vec3(c.x(), c.y(), c.z()));
-            };
-            Diagonal diagonal{place(first, 0), place(1 - first, 1), {}};
-            const Vec3 middle = 0.5 * (diagonal.from + diagonal.to);
-            const double between = 0.5 * (value(0, first, 0) + value(0, 1 - first, 1));
-            for (int w = 0; w < 2; ++w) {
-                const int u = w == 0 ? 1 - first : first;
-                diagonal.beside[w] = middle + between / (between - value(0, u, w)) * (place(u, w) - middle);
-            }
-            result.push_back(diagonal);
-        }
+    for (const auto& block : blocks) result.insert(result.end(), block.begin(), block.end());
     return result;
 }
 bool LevelSet::empty() const {
-    return impl_->crossed.empty();
+    return impl_->crossed.edges.empty();
 }
 std::size_t LevelSet::active_voxels() const {
     return impl_->active_voxels;
@@ -591,7 +547,7 @@ double LevelSet::value_scale() const {
     return impl_->scale;
 }
 std::size_t LevelSet::crossing_count() const {
-    return impl_->crossed.size();
+    return impl_->crossed.edges.size();
 }
 std::size_t LevelSet::border_crossings() const {
     return impl_->border_crossings;

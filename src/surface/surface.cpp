@@ -9,6 +9,7 @@ constexpr int kMaxTrials = 40;           // a good start needs 3 to 5
 constexpr double kFirstDamping = 1e-3;   // the paper starts at 1, which only halves the first step
 constexpr double kLargestDamping = 1e4;  // steps are then too short to matter
 constexpr double kLeastGradient = 1e-3;  // of a distance's 1: below it nothing is known
+constexpr double kOnNode = 1e-6;         // lattice units
 
 /// The nodes of the default lattice, which reaches a node beyond the box on each side.
 Eigen::Array3i nodes_across(const Box& box, double h) {
@@ -59,7 +60,7 @@ Eigen::Affine3d Surface::lattice() const {
     return result;
 }
 
-std::vector<Surface::Crossing> Surface::crossings() const {
+std::vector<Surface::Crossing> Surface::crossings(double) const {
     std::vector<Crossing> result;
     const Box box = bounds();
     if (box.isEmpty()) return result;
@@ -94,6 +95,23 @@ std::vector<Surface::Crossing> Surface::crossings() const {
                 if (y + 1 < n.y()) cross(here[i], here[i + n.z()], at, 1);
                 if (z + 1 < n.z()) cross(here[i], here[i + 1], at, 2);
             }
+    }
+    return result;
+}
+
+std::vector<Eigen::Vector3i> Surface::upright_crossings() const {
+    const Eigen::Affine3d from_lattice = lattice(), to_lattice = from_lattice.inverse();
+    const auto access = probe();
+    std::vector<Eigen::Vector3i> result;
+    for (const auto& c : crossings()) {
+        const Vec3 way = to_lattice.linear() * c.outward.cast<double>(), p = to_lattice * c.point;
+        if (std::abs(way.z()) < 0.5 * way.norm()) continue;
+        const Vec3 nearest = p.array().round();
+        // On a node rounding decides which of its edges is crossed.
+        const double beyond = p.z() - nearest.z();
+        const auto is_inside = [&] { return access->value(from_lattice * nearest) < 0.0; };
+        const bool up = std::abs(beyond) > kOnNode ? beyond > 0.0 : is_inside() == (way.z() > 0.0);
+        result.push_back(nearest.cast<int>() - (up ? 0 : 1) * Eigen::Vector3i::UnitZ());
     }
     return result;
 }

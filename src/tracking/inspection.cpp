@@ -1,6 +1,7 @@
 #include "tracking/inspection.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "meshing/sharpness.h"
@@ -167,20 +168,41 @@ bool Inspector::is_missed(double distance) const {
 }
 
 void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const {
-    const Vec3 near = Vec3::Constant(kFaultReach * surface_.resolution());
-    std::vector<std::size_t> doubtful;
-    for (const Vec3& place : places)
-        crossings_.for_each_in(Box(place - near, place + near), [&](std::size_t c) {
-            if ((crossings_.crossings()[c].point - place).norm() <= near.x()) doubtful.push_back(c);
-        });
-    std::sort(doubtful.begin(), doubtful.end());
-    doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
-    for (const std::size_t c : doubtful)
-        inspection.doubtful.push_back({crossings_.crossings()[c].point, spacing * surface_.resolution()});
+    if (places.empty()) return;
+    const Eigen::Affine3d lattice = surface_.lattice(), to_lattice = lattice.inverse();
+    const double reach = kFaultReach * surface_.resolution();
+    const Vec3 extent = reach * to_lattice.linear().rowwise().norm();
+    const auto probe = surface_.probe();
+    std::vector<std::array<double, 3>> found;
+    for (const Vec3& place : places) {
+        const Vec3 middle = to_lattice * place;
+        const Vec3 from = (middle - extent).array().floor(), to = (middle + extent).array().ceil();
+        const Eigen::Array3i size = (to - from).cast<int>().array() + 1;
+        std::vector<double> values;
+        for (int x = 0; x < size.x(); ++x)
+            for (int y = 0; y < size.y(); ++y)
+                for (int z = 0; z < size.z(); ++z)
+                    values.push_back(probe->value(lattice * (from + Vec3(x, y, z))));
+        const int stride[3] = {size.y() * size.z(), size.z(), 1};
+        for (int i = 0; i < static_cast<int>(values.size()); ++i) {
+            const int at[3] = {i / stride[0], i / stride[1] % size.y(), i % size.z()};
+            for (int axis = 0; axis < 3; ++axis) {
+                if (at[axis] + 1 == size[axis]) continue;
+                const double a = values[i], b = values[i + stride[axis]];
+                if ((a < 0.0) == (b < 0.0)) continue;
+                const Vec3 p = lattice * (from + Vec3(at[0], at[1], at[2]) + a / (a - b) * Vec3::Unit(axis));
+                if ((p - place).norm() <= reach) found.push_back({p.x(), p.y(), p.z()});
+            }
+        }
+    }
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    for (const auto& p : found)
+        inspection.doubtful.push_back({Vec3(p[0], p[1], p[2]), spacing * surface_.resolution()});
 }
 
 void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {
-    if (!sides_) sides_.emplace(surface_, crossings_.crossings());
+    if (!sides_) sides_.emplace(surface_);
     inspection.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, *sides_);
     doubt(inspection.topology.faults, looks_ == 0 ? kFaultSpacing : kVainSpacing, inspection);
     if (looks_ <= 1) {

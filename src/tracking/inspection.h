@@ -54,7 +54,7 @@ private:
     std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
     std::vector<Vec3> measure_distances(const FrameMesh& mesh, Inspection& result);
     bool is_missed(double distance) const;
-    /// Adds the crossings near some places to the doubtful ones; `spacing` in resolutions.
+    /// Adds the lattice crossings near some places to the doubtful ones; `spacing` in resolutions.
     void doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const;
 
     const Surface& surface_;

@@ -159,7 +159,7 @@ std::map<std::string, std::string> effective_settings(const MeshSequenceOptions&
     return s;
 }
 
-void describe(const TrackedFrame& tracked, const LevelSet& level_set, double tolerance, FrameReport& row) {
+void describe(const TrackedFrame& tracked, const LevelSet& level_set, FrameReport& row) {
     const double voxel = level_set.voxel_size();
     const MeshTopology topology = mesh_topology(tracked.mesh);
     row.voxel_size = voxel;
@@ -191,7 +191,7 @@ void describe(const TrackedFrame& tracked, const LevelSet& level_set, double tol
     } else if (!tracked.within_tolerance) {
         char text[128];
         std::snprintf(text, sizeof text, "largest error %.4g voxels, tolerance %.4g",
-                      tracked.max_error / voxel, tolerance / voxel);
+                      tracked.max_error / voxel, tracked.tolerance / voxel);
         row.status = "tolerance_not_met";
         row.message = text;
         if (tracked.lost_crossings > 0)
@@ -234,7 +234,6 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
     RunReport report;
     report.version = ISOTRACK_VERSION;
     std::optional<Tracker> tracker;
-    double tolerance = 0.0;
     openvdb::Vec3SGrid::ConstPtr velocity;  // of the frame the particles are on
     int tracked_frame = 0;
 
@@ -303,7 +302,6 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         }
         if (!tracker && !read.level_set->empty()) {
             const TrackerOptions resolved = tracker_options(options, read.level_set->voxel_size());
-            tolerance = resolved.tolerance;
             tracker.emplace(resolved);
             report.settings = effective_settings(options, read.level_set->voxel_size());
             if (events.started) events.started(report);
@@ -328,11 +326,11 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         tracked_frame = row.frame;
         finish_pending();
         if (stop) break;
-        auto write = [row, start, per_time, tolerance, finish_mesh = std::move(finish_mesh),
-                      read_seconds = read.seconds, level_set = std::move(read.level_set)]() mutable {
+        auto write = [row, start, per_time, finish_mesh = std::move(finish_mesh), read_seconds = read.seconds,
+                      level_set = std::move(read.level_set)]() mutable {
             TrackedFrame tracked = finish_mesh();
             for (Vec3& v : tracked.mesh.velocities) v *= per_time;
-            describe(tracked, *level_set, tolerance, row);
+            describe(tracked, *level_set, row);
             row.seconds["read"] = read_seconds;
             row.seconds["total"] = seconds_since(start);
             const auto write_start = Clock::now();

@@ -41,12 +41,16 @@ constexpr int kFollowSweeps = 3;
 constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
 constexpr double kFollowThinning = 0.6;           // what certify added last lives longer
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
+constexpr double kDetail = 2.0;       // tolerances
+constexpr double kDetailOfEdges = 0.25;
+constexpr double kCrossingsApart = 0.5;  // details: what lies between crossings is found from the triangles
+constexpr double kBandShare = 0.8;       // of the reach: interpolated values are right up to there
 constexpr int kCertifyRounds = 24;
 constexpr int kFitSteps = 6;
 constexpr double kFitWideExponent = 0.5;
 constexpr int kBluntRounds = 3, kBluntPasses = 4;
 constexpr double kBluntShare = 0.96;    // of the tolerance, for the triangles they change
-constexpr double kAngleFloor = 2.0;     // resolutions: sharp edges are as round as the grid makes them
+constexpr double kAngleFloor = 2.0;     // details: sharp edges are as round as they make them
 constexpr double kLeastSpacing = 5e-4;  // resolutions: a single node inside may leave no more than that
 
 /// Adds the time from its construction to its destruction to a stage.
@@ -218,13 +222,24 @@ struct Tracker::Impl {
         return as_in_paper ? UpdateStrategy::Lazy : options.delaunay;
     }
 
+    double tolerance(const Surface& surface) const {
+        return std::min(options.tolerance, kBandShare * surface.reach());
+    }
+
+    /// What is smaller need not be looked at, world units.
+    double detail(const Surface& surface) const {
+        double enough = kDetail * tolerance(surface);
+        if (options.max_edge) enough = std::min(enough, kDetailOfEdges * *options.max_edge);
+        return std::max(surface.resolution(), enough);
+    }
+
     SizingLimits limits(const Surface& surface) const {
         SizingLimits l{};
-        l.tolerance = options.tolerance;
+        l.tolerance = tolerance(surface);
         l.angle = options.angle_deg.value_or(default_angle_deg(options.method)) * kPi / 180.0;
-        l.angle_floor = kAngleFloor * surface.resolution();
-        l.min_edge = options.min_edge.value_or(0.5 * surface.resolution());
-        l.max_edge = std::max(options.max_edge.value_or(40.0 * surface.resolution()), l.min_edge);
+        l.angle_floor = kAngleFloor * detail(surface);
+        l.min_edge = options.min_edge.value_or(0.5 * detail(surface));
+        l.max_edge = std::max(options.max_edge.value_or(40.0 * detail(surface)), l.min_edge);
         l.wide_exponent = options.fit ? kFitWideExponent : 0.0;
         return l;
     }
@@ -540,6 +555,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     std::optional<Inspector>& inspector = work->inspector;
     Inspection& inspection = work->inspection;
     auto& seconds = frame.seconds;
+    frame.tolerance = l.tolerance;
     frame.delaunay_strategy = name_of(strategy());
     const std::size_t relocated = dt->profile().relocated;
     const std::vector<Id> before = particles.id;
@@ -551,7 +567,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     }
     {
         const StageTimer timer(seconds, "cover");
-        work->crossings.emplace(surface);
+        work->crossings.emplace(surface, kCrossingsApart * detail(surface));
         frame.seeded = cover(particles, surface, *work->crossings, l, options.seed, next_id);
     }
     if (options.method == Method::Paper)

@@ -130,15 +130,17 @@ int track(const TrackArguments& arguments) {
     Tracker tracker(options);
 
     Json row{{"voxels", 0.0}, {"particles", 0.0}, {"not_kept", 0.0}, {"seeded", 0.0},
-             {"read", 0.0},   {"advance", 0.0},   {"above_mb", 0.0}};
+             {"read", 0.0},   {"open", 0.0},      {"advance", 0.0},  {"above_mb", 0.0}};
     double grid_mb = 0.0;
     const double measured = static_cast<double>(std::min(arguments.measure, input.size()));
     for (std::size_t i = 0; i < input.size(); ++i) {
+        openvdb::GridBase::ConstPtr grid;
         std::unique_ptr<LevelSet> level_set;
         const double read = seconds_of([&] {
             const std::string& path = input[i].path;
-            level_set = std::make_unique<LevelSet>(read_grid(path, choose_grid(list_grids(path), {}, path)));
+            grid = read_grid(path, choose_grid(list_grids(path), {}, path));
         });
+        const double open = seconds_of([&] { level_set = std::make_unique<LevelSet>(grid); });
         if (i == 0) grid_mb = memory_mb("VmRSS");
         reset_peak();
         TrackedFrame frame;
@@ -153,6 +155,7 @@ int track(const TrackArguments& arguments) {
         add("not_kept", frame.within_tolerance ? 0.0 : 1.0);
         add("seeded", static_cast<double>(frame.seeded));
         add("read", read);
+        add("open", open);
         add("advance", advance);
         for (const auto& [stage, seconds] : frame.seconds) add(stage, seconds);
         if (!arguments.peers) continue;

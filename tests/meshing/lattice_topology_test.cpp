@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
+#include <set>
+#include <vector>
 
 #include "isotrack/compare/baselines.h"
 #include "isotrack/meshing/mesh_topology.h"
@@ -21,7 +24,7 @@ using support::join;
 using support::torus;
 
 LatticeTopology topology_of(const TriangleMesh& mesh, const Surface& surface) {
-    return lattice_topology(mesh.points, mesh.triangles, LatticeSides(surface, surface.crossings()));
+    return lattice_topology(mesh.points, mesh.triangles, LatticeSides(surface));
 }
 
 bool has_specks(const LatticeTopology& topology) {
@@ -146,6 +149,70 @@ TEST(LatticeTopology, CountsAComponentThatVolumeToMeshPartsFromOthersAsMissing) 
     }
     EXPECT_GT(parted, 10);
     EXPECT_GT(joined, 10);
+}
+
+/// V - E + F - C of the union of the closed unit cubes around these nodes.
+int euler_of_cubes(const std::vector<openvdb::Coord>& nodes) {
+    std::set<std::array<int, 3>> cells;  // of every dimension: each coordinate doubled, odd where it extends
+    for (const openvdb::Coord& n : nodes)
+        for (int x = -1; x <= 1; ++x)
+            for (int y = -1; y <= 1; ++y)
+                for (int z = -1; z <= 1; ++z) cells.insert({2 * n.x() + x, 2 * n.y() + y, 2 * n.z() + z});
+    int euler = 0;
+    for (const auto& c : cells) {
+        const int even = (c[0] % 2 == 0) + (c[1] % 2 == 0) + (c[2] % 2 == 0);
+        euler += even % 2 == 0 ? 1 : -1;
+    }
+    return euler;
+}
+
+int count_26_components(std::vector<openvdb::Coord> nodes) {
+    std::set<openvdb::Coord> left(nodes.begin(), nodes.end());
+    int count = 0;
+    while (!left.empty()) {
+        ++count;
+        std::vector<openvdb::Coord> front{*left.begin()};
+        left.erase(left.begin());
+        while (!front.empty()) {
+            const openvdb::Coord at = front.back();
+            front.pop_back();
+            for (int i = 0; i < 27; ++i)
+                if (const auto next = left.find(at.offsetBy(i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1));
+                    next != left.end()) {
+                    front.push_back(*next);
+                    left.erase(next);
+                }
+        }
+    }
+    return count;
+}
+
+TEST(LatticeTopology, HasNoFaultsOnlyWhereTheNodesHaveTheSameTopology) {
+    // A floor and a ceiling, nodes apart between mesh and surface, that now and then touch or have a hole.
+    std::mt19937 random(11);
+    const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
+    int same = 0, different = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+        std::vector<openvdb::Coord> of_mesh, of_surface;
+        const int slope = trial % 3, gap = 3 + trial % 2;
+        for (int x = -4; x <= 4; ++x)
+            for (int y = -4; y <= 4; ++y)
+                for (auto* nodes : {&of_mesh, &of_surface}) {
+                    const int floor = slope * x - 2 + below(2) + (below(40) == 0 ? 2 : 0);
+                    const int top = below(150) == 0 ? -8 : std::min(floor, 7);
+                    const int ceiling = std::max(slope * x + gap - below(2), top + 1);
+                    for (int z = -7; z <= top; ++z) nodes->emplace_back(x, y, z);
+                    for (int z = std::max(ceiling, -7); z <= 7; ++z) nodes->emplace_back(x, y, z);
+                }
+        const TriangleMesh mesh = volume_to_mesh(level_set_of(of_mesh));
+        const bool passes = topology_of(mesh, level_set_of(of_surface)).faults.empty();
+        (passes ? same : different) += 1;
+        if (!passes) continue;
+        EXPECT_EQ(count_26_components(of_mesh), count_26_components(of_surface)) << "trial " << trial;
+        EXPECT_EQ(euler_of_cubes(of_mesh), euler_of_cubes(of_surface)) << "trial " << trial;
+    }
+    EXPECT_GT(same, 15);
+    EXPECT_GT(different, 15);
 }
 
 }  // namespace

@@ -133,7 +133,7 @@ TEST(LatticeTopology, SaysWhichDiagonalsTheMeshParts) {
         grid->tree().setValueOn(c, -0.3f);
     const LevelSet level_set(grid);
     ASSERT_EQ(level_set.diagonals().size(), 3u);
-    const LatticeSides sides(level_set, level_set.crossings());
+    const LatticeSides sides(level_set);
     const auto bar = [](const Vec3& at) {
         TriangleMesh mesh = support::icosphere(3, {0, 0, 0}, 1.0);
         for (Vec3& p : mesh.points) p = at + p.cwiseProduct(Vec3(1.6, 0.45, 0.45));

@@ -13,11 +13,15 @@
 #include <filesystem>
 #include <limits>
 #include <random>
+#include <set>
 #include <sstream>
 #include <thread>
+#include <utility>
 
 #include "isotrack/error.h"
 #include "isotrack/io/vdb_file.h"
+#include "isotrack/surface/rasterise.h"
+#include "isotrack/surface/shapes.h"
 
 namespace isotrack {
 namespace {
@@ -122,6 +126,93 @@ std::size_t brute_force_crossings(const openvdb::FloatGrid& grid, openvdb::Coord
             count += (accessor.getValue(*c) < 0.0f) !=
                      (accessor.getValue((*c).offsetBy(axis == 0, axis == 1, axis == 2)) < 0.0f);
     return count;
+}
+
+TEST(LevelSet, FindsTheCrossedEdgesOfARandomGrid) {
+    // Scattered leaves with random values, active or not, beside tiles of either sign.
+    std::mt19937 random(5);
+    for (int trial = 0; trial < 20; ++trial) {
+        const auto grid = openvdb::FloatGrid::create(3.0f);
+        grid->setGridClass(openvdb::GRID_LEVEL_SET);
+        for (int leaf = 0; leaf < 27; ++leaf) {
+            const openvdb::Coord origin(8 * (leaf / 9 - 1), 8 * (leaf / 3 % 3 - 1), 8 * (leaf % 3 - 1));
+            if (random() % 3 == 0) {
+                grid->tree().addTile(1, origin, random() % 2 == 0 ? 3.0f : -3.0f, false);
+                continue;
+            }
+            for (int i = 0; i < 512; ++i) {
+                const openvdb::Coord c = origin.offsetBy(i / 64, i / 8 % 8, i % 8);
+                const float value = 0.01f * (static_cast<float>(random() % 400) - 199.5f);
+                random() % 4 == 0 ? grid->tree().setValueOff(c, value) : grid->tree().setValueOn(c, value);
+            }
+        }
+        using Edge = std::pair<openvdb::Coord, int>;
+        std::set<Edge> expected, found, found_upright;
+        std::size_t at_border = 0;
+        const auto value = grid->getConstAccessor();
+        const auto has_leaf = [&](const openvdb::Coord& c) {
+            return grid->tree().probeConstLeaf(c) != nullptr;
+        };
+        for (auto c = openvdb::CoordBBox(openvdb::Coord(-10), openvdb::Coord(18)).begin(); c; ++c)
+            for (int axis = 0; axis < 3; ++axis) {
+                const openvdb::Coord next = (*c).offsetBy(axis == 0, axis == 1, axis == 2);
+                if ((value.getValue(*c) < 0.0f) == (value.getValue(next) < 0.0f)) continue;
+                if (!has_leaf(*c) && !has_leaf(next)) continue;
+                expected.insert({*c, axis});
+                at_border += !value.isValueOn(*c) || !value.isValueOn(next);
+            }
+        const LevelSet level_set(grid);
+        ASSERT_EQ(level_set.value_scale(), 1.0);
+        for (const auto& crossing : level_set.crossings()) {
+            const int axis = static_cast<int>(
+                std::max_element(crossing.outward.data(), crossing.outward.data() + 3,
+                                 [](float a, float b) { return std::abs(a) < std::abs(b); }) -
+                crossing.outward.data());
+            openvdb::Coord from(0);
+            for (int i = 0; i < 3; ++i) {
+                const double x = crossing.point[i];
+                from[i] = static_cast<int>(i == axis ? std::floor(x) : std::lround(x));
+            }
+            found.insert({from, axis});
+        }
+        for (const Eigen::Vector3i& node : level_set.upright_crossings())
+            found_upright.insert({openvdb::Coord(node.x(), node.y(), node.z()), 2});
+        EXPECT_EQ(found, expected);
+        EXPECT_EQ(level_set.crossing_count(), expected.size());
+        EXPECT_EQ(level_set.border_crossings(), at_border);
+        for (auto e = expected.begin(); e != expected.end();)
+            e = e->second == 2 ? std::next(e) : expected.erase(e);
+        EXPECT_EQ(found_upright, expected);
+    }
+}
+
+TEST(LevelSet, LetsACrossingStandForOthersInACube) {
+    const double h = 0.02;
+    // A ball, a drop of three voxels between the lines of a coarse lattice, and a plate of two.
+    const auto shape =
+        shapes::unite({shapes::sphere({0, 0, 0}, 0.6, h), shapes::sphere({1.013, 0.02, 0.51}, 1.5 * h, h),
+                       shapes::box({0, 1.5, 0}, {0.5, h, 0.4}, h)});
+    const LevelSet level_set(rasterise(*shape, h));
+    const auto all = level_set.crossings();
+    EXPECT_EQ(level_set.crossings(1.99 * h).size(), all.size());
+    for (const int cube : {2, 4, 8}) {
+        const auto some = level_set.crossings(1.001 * cube * h);
+        EXPECT_LT(some.size(), 1.7 * static_cast<double>(all.size()) / (cube * cube));
+        for (const auto& c : all) {
+            // One axis-parallel cube holds both, a voxel added for the lengths of the edges.
+            const bool stands_for =
+                std::any_of(some.begin(), some.end(), [&](const Surface::Crossing& other) {
+                    return (other.point - c.point).cwiseAbs().maxCoeff() <= (cube + 1) * h;
+                });
+            ASSERT_TRUE(stands_for) << c.point.transpose();
+        }
+        // Of the plate both sides are seen.
+        for (const double side : {-1.0, 1.0})
+            EXPECT_TRUE(std::any_of(some.begin(), some.end(), [&](const Surface::Crossing& c) {
+                return (c.point - Vec3(0.01, 1.5 + side * h, 0.01)).norm() < 1.5 * cube * h &&
+                       c.outward.y() * side > 0.5;
+            }));
+    }
 }
 
 TEST(LevelSet, IsTheSphereItWasMadeFrom) {

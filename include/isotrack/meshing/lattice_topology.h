@@ -2,9 +2,9 @@
 #pragma once
 
 #include <cstddef>
-#include <utility>
 #include <vector>
 
+#include "isotrack/meshing/lattice_layers.h"
 #include "isotrack/surface/surface.h"
 #include "isotrack/types.h"
 
@@ -24,32 +24,30 @@ struct LatticeTopology {
     std::vector<char> speck;
 };
 
-/// Where a lattice line in the third direction meets a surface or a mesh.
-struct LineHit {
-    int x, y, component;  ///< Of the line; of the mesh.
-    double z;             ///< Lattice units.
-};
-
 /// The sides of the lattice nodes of a surface, to hold meshes of it against. Read-only, so threads may share
 /// it.
 class LatticeSides {
 public:
-    /// `crossings` are those of `surface`, which must outlive this.
-    LatticeSides(const Surface& surface, const std::vector<Surface::Crossing>& crossings);
+    /// `surface` must outlive this.
+    explicit LatticeSides(const Surface& surface);
 
     const Surface& surface() const { return surface_; }
     /// The surface's, ascending in the least x of their nodes.
     const std::vector<Surface::Diagonal>& diagonals() const { return diagonals_; }
-    /// Along the lines, halfway between the two nodes of each crossed edge; ascending in x, y and z.
-    const std::vector<LineHit>& hits() const { return hits_; }
+    /// The crossed edges along the lattice's third axis, each from its lower node (x, y, z); ascending in x,
+    /// y and z.
+    struct Upright {
+        int x, y, z;
+    };
+    using Uprights = LatticeLayers<Upright>;
+    const Uprights& uprights() const { return uprights_; }
     /// Those of one line.
-    std::pair<const LineHit*, const LineHit*> line(int x, int y) const;
+    Uprights::Range line(int x, int y) const;
 
 private:
     const Surface& surface_;
     std::vector<Surface::Diagonal> diagonals_;
-    std::vector<LineHit> hits_;
-    std::vector<std::size_t> first_;  // of each x from the least
+    Uprights uprights_;
 };
 
 /// The mesh must be closed. Nodes count as on the side of the mesh that the lattice line in the third

@@ -13,12 +13,14 @@ namespace isotrack {
 /// on the crossings alone. Read-only, so threads may share it.
 class CrossingGrid {
 public:
-    explicit CrossingGrid(const Surface& surface)
-        : CrossingGrid(surface.crossings(), 2.0 * surface.resolution()) {}
-    /// `width` of a column, world units; wider where there would be many more columns than crossings.
-    CrossingGrid(std::vector<Surface::Crossing> crossings, double width);
+    /// Those of `surface.crossings(apart)`.
+    explicit CrossingGrid(const Surface& surface, double apart = 0.0)
+        : CrossingGrid(surface.crossings(apart), std::max(surface.resolution(), apart)) {}
+    /// `spacing` of the crossings, world units.
+    CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing);
 
     const std::vector<Surface::Crossing>& crossings() const { return crossings_; }
+    double spacing() const { return spacing_; }
 
     /// Calls `visit` with the index of every crossing in `box`; of those in columns that are set only, if
     /// given.
@@ -67,7 +69,7 @@ private:
     std::vector<Surface::Crossing> crossings_;
     std::vector<std::size_t> first_;  // of each column, and the end
     Vec3 origin_ = Vec3::Zero();
-    double width_ = 1.0;
+    double spacing_, width_;  // of the columns: wider where there would be many more than crossings
     int count_[2] = {1, 1};
 };
 

@@ -45,7 +45,9 @@ public:
     /// at least a voxel wide on both sides of the surface, so there the surface leaves the active voxels: it
     /// meets the border.
     bool at_border(const Vec3& p) const override;
-    std::vector<Crossing> crossings() const override;
+    using Surface::crossings;
+    std::vector<Crossing> crossings(double apart) const override;
+    std::vector<Eigen::Vector3i> upright_crossings() const override;
     std::vector<Diagonal> diagonals() const override;
 
     /// True when there is no surface: no sign change between neighbouring voxels.

@@ -78,8 +78,13 @@ public:
     };
 
     /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
-    /// in the same order. This default scans `bounds()`.
-    virtual std::vector<Crossing> crossings() const;
+    /// in the same order.
+    std::vector<Crossing> crossings() const { return crossings(0.0); }
+    /// One of those within a cube of an edge up to `apart` may stand for others there, but never one that
+    /// goes in for one that goes out along the same axis. This default scans `bounds()` and gives all.
+    virtual std::vector<Crossing> crossings(double apart) const;
+    /// The lower ends of the crossed edges along the lattice's third axis, in any order.
+    virtual std::vector<Eigen::Vector3i> upright_crossings() const;
 
     /// Two nodes of `lattice()` on one side of the surface, joined across the diagonal of a face whose other
     /// two nodes are on the other side.

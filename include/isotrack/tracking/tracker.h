@@ -38,7 +38,9 @@ double default_angle_deg(Method method);
 
 /// All lengths in world units.
 struct TrackerOptions {
-    double tolerance = 0.0;           ///< > 0. Largest wanted distance between mesh and surface, either way.
+    /// > 0. Largest wanted distance between mesh and surface, either way. No more than 0.8 of the surface's
+    /// `reach()` is used: beyond it distances are not known.
+    double tolerance = 0.0;
     std::optional<double> angle_deg;  ///< Wanted angle between neighbours' normals, degrees in (0, 90].
                                       ///< Unset: `default_angle_deg`.
     std::optional<double> min_edge;   ///< Smallest spacing. Unset: half the surface's resolution.
@@ -62,8 +64,10 @@ struct TrackedFrame {
     int sweeps = 0;             ///< Relaxation sweeps over all particles.
     std::size_t relocated = 0;  ///< Vertices the tetrahedralisation moved one by one.
     std::string delaunay_strategy;
-    /// The larger of the distances mesh to surface (at 28 points of each triangle) and back (at every lattice
-    /// crossing), measured on `mesh`, world units; RMS likewise. Crossings farther than three tolerances from
+    double tolerance = 0.0;  ///< The one that was used.
+    /// The larger of the distances mesh to surface (at 28 points of each triangle) and back (at the lattice
+    /// crossings, of which those nearer to each other than two tolerances stand for one another), measured on
+    /// `mesh`, world units; RMS likewise. Crossings farther than three tolerances from
     /// any triangle that faces their way are counted as lost instead.
     double max_error = 0.0, rms_error = 0.0;
     bool opened = false;             ///< A cap was left out: the mesh has a border there.

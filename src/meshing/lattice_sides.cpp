@@ -1,0 +1,25 @@
+#include <algorithm>
+#include <tuple>
+
+#include "isotrack/meshing/lattice_topology.h"
+
+namespace isotrack {
+
+LatticeSides::LatticeSides(const Surface& surface) : surface_(surface), diagonals_(surface.diagonals()) {
+    const auto least_x = [](const Surface::Diagonal& d) { return std::min(d.from.x(), d.to.x()); };
+    std::stable_sort(diagonals_.begin(), diagonals_.end(),
+                     [&](const auto& a, const auto& b) { return least_x(a) < least_x(b); });
+    std::vector<Upright> uprights;
+    for (const Eigen::Vector3i& node : surface.upright_crossings())
+        uprights.push_back({node.x(), node.y(), node.z()});
+    uprights_ = Uprights(
+        uprights, [](const Upright& a, const Upright& b) { return std::tie(a.y, a.z) < std::tie(b.y, b.z); });
+}
+
+LatticeSides::Uprights::Range LatticeSides::line(int x, int y) const {
+    auto [begin, end] = uprights_.layer(x);
+    begin = std::partition_point(begin, end, [&](const Upright& u) { return u.y < y; });
+    return {begin, std::find_if(begin, end, [&](const Upright& u) { return u.y != y; })};
+}
+
+}  // namespace isotrack

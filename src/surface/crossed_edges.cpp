@@ -1,0 +1,181 @@
+#include "surface/crossed_edges.h"
+
+#include <openvdb/tree/LeafManager.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+namespace isotrack {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatTree;
+using Leaf = FloatTree::LeafNodeType;
+using Accessor = openvdb::tree::ValueAccessor<const FloatTree, false>;  // unregistered: the tree outlives it
+using Bits = std::uint64_t;
+
+constexpr int kDim = Leaf::DIM;
+static_assert(kDim == 8, "a layer of a leaf is a word");
+constexpr std::size_t kLeavesPerBlock = 64;
+
+/// Calls `visit(bit)` for each that is set.
+template <typename Visit>
+void for_each_bit(Bits bits, const Visit& visit) {
+    for (; bits != 0; bits &= bits - 1) visit(__builtin_ctzll(bits));
+}
+
+constexpr int kStride[3] = {kDim * kDim, kDim, 1};
+
+/// Of the node at bit `i` of a layer of a leaf across `axis`, the one number `at`.
+int offset_in(int axis, int at, int i) {
+    const int u = i / kDim, w = i % kDim;
+    return at * kStride[axis] + u * kStride[axis == 0 ? 1 : 0] + w * kStride[axis == 2 ? 1 : 2];
+}
+
+/// Which nodes of such a layer are inside.
+template <int axis>
+Bits layer(const float* values, int at) {
+    Bits result = 0;
+    for (int i = 0; i < 64; ++i) result |= static_cast<Bits>(values[offset_in(axis, at, i)] < 0.0f) << i;
+    return result;
+}
+Bits layer(const float* values, int axis, int at) {
+    return axis == 0 ? layer<0>(values, at) : axis == 1 ? layer<1>(values, at) : layer<2>(values, at);
+}
+
+void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
+                  std::vector<CrossedEdge>& found) {
+    const float* own = leaf.buffer().data();
+    const Coord origin = leaf.origin();
+    const auto add = [&](const Coord& from, int axis, float a, float b, bool active) {
+        const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
+        found.push_back({from, fraction, static_cast<std::int8_t>(axis), a < 0.0f, !active});
+    };
+    const auto is_on = [](const Leaf& of, int offset) {
+        return of.isValueOn(static_cast<openvdb::Index>(offset));
+    };
+    constexpr Bits kNotLastY = 0x00ffffffffffffff, kNotLastZ = 0x7f7f7f7f7f7f7f7f;
+    Bits next = layer(own, 0, 0);
+    for (int x = 0; x < kDim; ++x) {
+        const Bits here = next;
+        if (x + 1 < kDim) next = layer(own, 0, x + 1);
+        const Bits crossed[3] = {here ^ next, (here ^ here >> kDim) & kNotLastY,
+                                 (here ^ here >> 1) & kNotLastZ};
+        for (int axis = 0; axis < 3; ++axis)
+            for_each_bit(crossed[axis], [&](int bit) {
+                const int offset = kDim * kDim * x + bit, beyond = offset + kStride[axis];
+                add(origin + Leaf::offsetToLocalCoord(offset), axis, own[offset], own[beyond],
+                    is_on(leaf, offset) && is_on(leaf, beyond));
+            });
+    }
+    // Across the leaf's faces: upwards always, downwards only where no leaf sees the edge from below.
+    for (int axis = 0; axis < 3; ++axis) {
+        Coord step(0);
+        step[axis] = kDim;
+        const auto cross_into_tile = [&](bool up) {
+            const Coord there = up ? origin + step : origin - step;
+            const float tile = tree.getValue(there);
+            const bool active = tree.isValueOn(there);
+            const int at = up ? kDim - 1 : 0;
+            for_each_bit(layer(own, axis, at) ^ (tile < 0.0f ? ~Bits{0} : 0), [&](int i) {
+                const int offset = offset_in(axis, at, i);
+                Coord from = origin + Leaf::offsetToLocalCoord(offset);
+                if (!up) from[axis] -= 1;
+                add(from, axis, up ? own[offset] : tile, up ? tile : own[offset],
+                    active && is_on(leaf, offset));
+            });
+        };
+        if (const Leaf* above = accessor.probeConstLeaf(origin + step)) {
+            const float* other = above->buffer().data();
+            for_each_bit(layer(own, axis, kDim - 1) ^ layer(other, axis, 0), [&](int i) {
+                const int offset = offset_in(axis, kDim - 1, i), beyond = offset_in(axis, 0, i);
+                add(origin + Leaf::offsetToLocalCoord(offset), axis, own[offset], other[beyond],
+                    is_on(leaf, offset) && is_on(*above, beyond));
+            });
+        } else {
+            cross_into_tile(true);
+        }
+        if (!accessor.probeConstLeaf(origin - step)) cross_into_tile(false);
+    }
+}
+
+/// Where the parts begin in all of them together, and the end.
+template <typename Part>
+std::vector<std::size_t> begins(const std::vector<Part>& parts) {
+    std::vector<std::size_t> result{0};
+    for (const auto& part : parts) result.push_back(result.back() + part.size());
+    return result;
+}
+
+}  // namespace
+
+CrossedEdges find_crossed_edges(const FloatTree& tree) {
+    const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
+    const std::size_t count = leaves.leafCount();
+    std::vector<std::vector<CrossedEdge>> blocks((count + kLeavesPerBlock - 1) / kLeavesPerBlock);
+    std::vector<std::size_t> ends(count);  // of each leaf, within its block
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
+        Accessor accessor(tree);
+        const std::size_t end = std::min(count, (block + 1) * kLeavesPerBlock);
+        for (std::size_t n = block * kLeavesPerBlock; n < end; ++n) {
+            add_edges_of(leaves.leaf(n), tree, accessor, blocks[block]);
+            ends[n] = blocks[block].size();
+        }
+    });
+    const std::vector<std::size_t> begin = begins(blocks);
+    CrossedEdges result;
+    result.edges.resize(begin.back());
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
+        std::copy(blocks[block].begin(), blocks[block].end(),
+                  result.edges.begin() + static_cast<std::ptrdiff_t>(begin[block]));
+    });
+    std::size_t last = 0;
+    for (std::size_t n = 0; n < count; ++n) {
+        const std::size_t end = begin[n / kLeavesPerBlock] + ends[n];
+        if (end > last) result.parts.push_back({leaves.leaf(n).origin(), last, end});
+        last = end;
+    }
+    return result;
+}
+
+std::vector<std::size_t> thin_out(const CrossedEdges& crossed, int cube) {
+    constexpr std::size_t kNone = ~std::size_t{0};
+    const std::size_t count = crossed.parts.size();
+    std::vector<std::vector<std::size_t>> blocks((count + kLeavesPerBlock - 1) / kLeavesPerBlock);
+    const int across = kDim / cube;
+    struct Cube {
+        int count[3];         // of edges along each axis
+        std::size_t some[6];  // the last of each direction
+    };
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
+        std::vector<Cube> cubes(static_cast<std::size_t>(across * across * across));
+        const std::size_t end = std::min(count, (block + 1) * kLeavesPerBlock);
+        for (std::size_t n = block * kLeavesPerBlock; n < end; ++n) {
+            const CrossedEdges::Part& part = crossed.parts[n];
+            for (Cube& c : cubes) {
+                std::fill_n(c.count, 3, 0);
+                std::fill_n(c.some, 6, kNone);
+            }
+            for (std::size_t e = part.begin; e < part.end; ++e) {
+                const CrossedEdge& edge = crossed.edges[e];
+                int at[3];
+                for (int axis = 0; axis < 3; ++axis)
+                    at[axis] = std::max(edge.from[axis] - part.origin[axis], 0) / cube;
+                Cube& c = cubes[static_cast<std::size_t>((at[0] * across + at[1]) * across + at[2])];
+                ++c.count[edge.axis];
+                c.some[2 * edge.axis + edge.outward] = e;
+            }
+            for (const Cube& c : cubes) {
+                const auto axis = std::max_element(c.count, c.count + 3) - c.count;
+                for (const std::size_t e : {c.some[2 * axis], c.some[2 * axis + 1]})
+                    if (e != kNone) blocks[block].push_back(e);
+            }
+        }
+    });
+    std::vector<std::size_t> result;
+    result.reserve(begins(blocks).back());
+    for (const auto& block : blocks) result.insert(result.end(), block.begin(), block.end());
+    return result;
+}
+
+}  // namespace isotrack

@@ -1,0 +1,48 @@
+// The lattice edges of a grid that cross its surface.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// From `from`, `fraction` of a voxel along `axis`.
+struct CrossedEdge {
+    openvdb::Coord from;
+    float fraction;
+    std::int8_t axis;
+    bool outward;    ///< `from` is the end inside.
+    bool at_border;  ///< One end is an inactive voxel.
+
+    Vec3 index() const {
+        Vec3 p(from.x(), from.y(), from.z());
+        p[axis] += fraction;
+        return p;
+    }
+};
+
+struct CrossedEdges {
+    /// Those found from one leaf.
+    struct Part {
+        openvdb::Coord origin;  ///< Of the leaf.
+        std::size_t begin, end;
+    };
+    std::vector<CrossedEdge> edges;
+    std::vector<Part> parts;  ///< One after the other.
+};
+
+/// Every edge with a sign change; values must be finite. Edges between two tiles are not seen: a level set
+/// has voxels at its surface.
+CrossedEdges find_crossed_edges(const openvdb::FloatTree& tree);
+
+/// Indices of those that stand for all when two edges that cross the same way and are in the same cube of
+/// `cube` voxels need not both be looked at: of each cube the edges along the axis that most of its edges
+/// follow, one outward, one inward. `cube`: 1, 2, 4 or 8.
+std::vector<std::size_t> thin_out(const CrossedEdges& crossed, int cube);
+
+}  // namespace isotrack
