@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 
 #include "isotrack/error.h"
@@ -68,30 +69,64 @@ class NodeValues {
 public:
     explicit NodeValues(const FloatTree& tree) : tree_(tree) {}
 
-    /// The values of the leaf that holds a node, at `offset`; nullptr in a tile.
-    const float* leaf(const Coord& node) {
-        const int x = node.x() >> Leaf::LOG2DIM, y = node.y() >> Leaf::LOG2DIM, z = node.z() >> Leaf::LOG2DIM;
-        Place& place = places_[((x & 3) << 4) | ((y & 3) << 2) | (z & 3)];
-        if (!place.used || place.leaf != Coord(x, y, z)) {
-            const Leaf* found = tree_.probeConstLeaf(node);
-            place = {true, Coord(x, y, z), found ? found->buffer().data() : nullptr};
-        }
-        return place.values;
-    }
     float at(const Coord& node) {
-        const float* values = leaf(node);
         constexpr int kMask = kLeafDim - 1;
-        return values ? values[offset(node.x() & kMask, node.y() & kMask, node.z() & kMask)]
-                      : tree_.getValue(node);
+        return leaf(node)[offset(node.x() & kMask, node.y() & kMask) + (node.z() & kMask)];
     }
-    static int offset(int x, int y, int z) { return (x << (2 * Leaf::LOG2DIM)) + (y << Leaf::LOG2DIM) + z; }
+
+    /// Those of N^3 nodes from `low` on. With N = 4 the columns at the corners of the first two axes are left
+    /// out.
+    template <int N>
+    void block(const Coord& low, float (&v)[N][N][N]) {
+        static_assert(N <= kLeafDim, "two leaves in a row hold all");
+        const Coord in_leaf = low & (kLeafDim - 1);
+        const float* leaves[2][2][2];
+        for (int a = 0; a <= (in_leaf.x() + N > kLeafDim); ++a)
+            for (int b = 0; b <= (in_leaf.y() + N > kLeafDim); ++b)
+                for (int c = 0; c <= (in_leaf.z() + N > kLeafDim); ++c)
+                    leaves[a][b][c] = leaf(low.offsetBy(kLeafDim * a, kLeafDim * b, kLeafDim * c));
+        const int here = std::min(N, kLeafDim - in_leaf.z());  // of each column, in the first leaf
+        for (int i = 0; i < N; ++i)
+            for (int j = 0; j < N; ++j) {
+                if (N == 4 && (i == 0 || i == 3) && (j == 0 || j == 3)) continue;
+                const int x = in_leaf.x() + i, y = in_leaf.y() + j;
+                const auto& column = leaves[x / kLeafDim][y / kLeafDim];
+                const int at = offset(x % kLeafDim, y % kLeafDim);
+                if (here == N) {
+                    std::memcpy(v[i][j], column[0] + at + in_leaf.z(), sizeof v[i][j]);
+                } else {
+                    for (int k = 0; k < here; ++k) v[i][j][k] = column[0][at + in_leaf.z() + k];
+                    for (int k = here; k < N; ++k) v[i][j][k] = column[1][at + k - here];
+                }
+            }
+    }
 
 private:
     struct Place {
-        bool used = false;
-        Coord leaf;  // in leaves
         const float* values = nullptr;
+        Coord leaf;                     // in leaves
+        std::unique_ptr<float[]> tile;  // as many values as a leaf has, all the same
     };
+
+    /// The values of the leaf that holds a node, or would.
+    const float* leaf(const Coord& node) {
+        const Coord at = node >> static_cast<int>(Leaf::LOG2DIM);
+        Place& place = places_[((at.x() & 3) << 4) | ((at.y() & 3) << 2) | (at.z() & 3)];
+        if (!place.values || place.leaf != at) fetch(node, at, place);
+        return place.values;
+    }
+    void fetch(const Coord& node, const Coord& at, Place& place) {
+        place.leaf = at;
+        if (const Leaf* found = tree_.probeConstLeaf(node)) {
+            place.values = found->buffer().data();
+            return;
+        }
+        if (!place.tile) place.tile = std::make_unique<float[]>(Leaf::SIZE);
+        std::fill_n(place.tile.get(), Leaf::SIZE, tree_.getValue(node));
+        place.values = place.tile.get();
+    }
+    static int offset(int x, int y) { return (x * kLeafDim + y) * kLeafDim; }
+
     const FloatTree& tree_;
     Place places_[64];
 };
@@ -106,14 +141,7 @@ public:
         Vec3 t;
         const Coord base = split(index, t);
         float v[2][2][2];
-        const int x = base.x() & (kLeafDim - 1), y = base.y() & (kLeafDim - 1), z = base.z() & (kLeafDim - 1);
-        const float* leaf = nullptr;
-        if (x < kLeafDim - 1 && y < kLeafDim - 1 && z < kLeafDim - 1) leaf = nodes_.leaf(base);
-        for (int i = 0; i < 2; ++i)
-            for (int j = 0; j < 2; ++j)
-                for (int k = 0; k < 2; ++k)
-                    v[i][j][k] = leaf ? leaf[NodeValues::offset(x + i, y + j, z + k)]
-                                      : nodes_.at(base.offsetBy(i, j, k));
+        nodes_.block(base, v);
         const auto mix = [](double a, double b, double s) { return a + s * (b - a); };
         double planes[2];
         for (int i = 0; i < 2; ++i)
@@ -128,8 +156,8 @@ public:
     Surface::Sample sample(const Vec3& index) {
         Vec3 t;
         const Coord base = split(index, t);
-        float v[4][4][4];  // v[i + 1][j + 1][k + 1] at base + (i, j, k); corners of the 4-cube are not read
-        gather(base, v);
+        float v[4][4][4];  // v[i + 1][j + 1][k + 1] at base + (i, j, k)
+        nodes_.block(base.offsetBy(-1), v);
         const double w[3][2] = {{1.0 - t.x(), t.x()}, {1.0 - t.y(), t.y()}, {1.0 - t.z(), t.z()}};
         Surface::Sample result{0.0, Vec3::Zero()};
         for (int a = 0; a < 2; ++a)
@@ -165,31 +193,13 @@ private:
         constexpr double kLimit = 1 << 30;
         Coord base;
         for (int axis = 0; axis < 3; ++axis) {
-            const double x = std::isfinite(index[axis]) ? std::clamp(index[axis], -kLimit, kLimit) : kLimit;
-            const double floor = std::floor(x);
-            base[axis] = static_cast<int>(floor);
-            t[axis] = x - floor;
+            double x = index[axis];
+            if (!(std::abs(x) < kLimit)) x = x < 0.0 && std::isfinite(x) ? -kLimit : kLimit;
+            const int towards_zero = static_cast<int>(x);
+            base[axis] = towards_zero - (x < towards_zero);
+            t[axis] = x - base[axis];
         }
         return base;
-    }
-
-    void gather(const Coord& base, float (&v)[4][4][4]) {
-        const int x = base.x() & (kLeafDim - 1), y = base.y() & (kLeafDim - 1), z = base.z() & (kLeafDim - 1);
-        const auto inner = [](int c) { return c >= 1 && c <= kLeafDim - 3; };
-        const float* leaf = inner(x) && inner(y) && inner(z) ? nodes_.leaf(base) : nullptr;
-        for (int i = 0; i < 4; ++i)
-            for (int j = 0; j < 4; ++j) {
-                const int outer = (i == 0 || i == 3) + (j == 0 || j == 3);
-                if (outer == 2) continue;
-                const int first = outer == 0 ? 0 : 1, last = outer == 0 ? 4 : 3;
-                if (leaf) {
-                    const float* line = leaf + NodeValues::offset(x + i - 1, y + j - 1, z - 1);
-                    for (int k = first; k < last; ++k) v[i][j][k] = line[k];
-                } else {
-                    for (int k = first; k < last; ++k)
-                        v[i][j][k] = nodes_.at(base.offsetBy(i - 1, j - 1, k - 1));
-                }
-            }
     }
 
     NodeValues nodes_;
