@@ -299,7 +299,7 @@ const Tetrahedra& LivingDelaunay::cells() {
 std::vector<int> LivingDelaunay::take_changed() {
     cells();
     std::vector<int> changed = std::exchange(impl_->changed, {});
-    std::sort(changed.begin(), changed.end());
+    if (!std::is_sorted(changed.begin(), changed.end())) std::sort(changed.begin(), changed.end());
     changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
     return changed;
 }

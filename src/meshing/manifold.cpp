@@ -16,11 +16,16 @@ namespace {
 class Boundary {
 public:
     Boundary(const Tetrahedra& cells, const CellLabels& labels) : cells_(cells), labels_(labels) {
-        for (std::size_t c = 0; c < cells.size(); ++c) {
-            if (!labels[c]) continue;
-            for (int k = 0; k < 4; ++k)
-                if (!labels[cells.neighbours[c][k]]) facets_.push_back({static_cast<int>(c), k});
-        }
+        constexpr std::size_t kBlock = 8192;
+        std::vector<std::vector<Facet>> blocks((cells.size() + kBlock - 1) / kBlock);
+        tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
+            for (std::size_t c = block * kBlock; c < std::min(cells.size(), (block + 1) * kBlock); ++c) {
+                if (!labels[c]) continue;
+                for (int k = 0; k < 4; ++k)
+                    if (!labels[cells.neighbours[c][k]]) blocks[block].push_back({static_cast<int>(c), k});
+            }
+        });
+        for (const auto& block : blocks) facets_.insert(facets_.end(), block.begin(), block.end());
     }
     struct Facet {
         int cell, k;

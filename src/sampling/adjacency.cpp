@@ -89,23 +89,31 @@ Adjacency Adjacency::extended(const std::vector<std::array<int, 3>>& newborn, st
 }
 
 Adjacency Adjacency::squared() const {
+    constexpr std::size_t kBlock = 1024;
+    struct Block {
+        std::vector<int> count, adjacent;
+    };
+    std::vector<Block> blocks((size() + kBlock - 1) / kBlock);
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+        Block& block = blocks[b];
+        for (std::size_t i = b * kBlock; i < std::min(size(), (b + 1) * kBlock); ++i) {
+            const auto start = static_cast<std::ptrdiff_t>(block.adjacent.size());
+            for (const int j : of(i)) {
+                block.adjacent.push_back(j);
+                block.adjacent.insert(block.adjacent.end(), of(j).begin(), of(j).end());
+            }
+            const auto from = block.adjacent.begin() + start;
+            auto to = std::remove(from, block.adjacent.end(), static_cast<int>(i));
+            std::sort(from, to);
+            block.adjacent.erase(std::unique(from, to), block.adjacent.end());
+            block.count.push_back(static_cast<int>(block.adjacent.end() - from));
+        }
+    });
     Adjacency result;
     result.first.reserve(first.size());
-    std::vector<int> seen(size(), -1);
-    for (std::size_t i = 0; i < size(); ++i) {
-        const int self = static_cast<int>(i);
-        seen[i] = self;
-        const auto add = [&](int j) {
-            if (seen[j] == self) return;
-            seen[j] = self;
-            result.adjacent.push_back(j);
-        };
-        for (const int j : of(i)) {
-            add(j);
-            for (const int k : of(j)) add(k);
-        }
-        std::sort(result.adjacent.begin() + result.first.back(), result.adjacent.end());
-        result.first.push_back(static_cast<int>(result.adjacent.size()));
+    for (const Block& block : blocks) {
+        result.adjacent.insert(result.adjacent.end(), block.adjacent.begin(), block.adjacent.end());
+        for (const int count : block.count) result.first.push_back(result.first.back() + count);
     }
     return result;
 }

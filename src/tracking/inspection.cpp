@@ -1,5 +1,7 @@
 #include "tracking/inspection.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -227,10 +229,21 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     std::vector<Shortage> result;
     const auto probe = surface.probe();
     const CarvedSurface& carved = mesh.carved;
-    for (std::size_t t = 0; t < inspection.errors.size(); ++t) {
-        const bool too_far = inspection.errors[t].largest > kCertified * limits.tolerance;
+    const auto is_too_far = [&](std::size_t t) {
+        return inspection.errors[t].largest > kCertified * limits.tolerance;
+    };
+    std::vector<char> fails(inspection.errors.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, fails.size(), 1024), [&](const auto& range) {
+        for (std::size_t t = range.begin(); t < range.end(); ++t) {
+            const auto [corner, whole] = corners_of(carved, t);
+            fails[t] =
+                is_too_far(t) || (whole && is_needle(mesh, particles, t, corner, surface.resolution()));
+        }
+    });
+    for (std::size_t t = 0; t < fails.size(); ++t) {
+        if (!fails[t]) continue;
+        const bool too_far = is_too_far(t);
         const auto [corner, whole] = corners_of(carved, t);
-        if (!too_far && !(whole && is_needle(mesh, particles, t, corner, surface.resolution()))) continue;
         const auto x = whole ? dual_crossing(cells, particles.position, carved.inside_cell[t],
                                              carved.inside_facet[t], *probe)
                              : std::nullopt;

@@ -1,8 +1,8 @@
 // Which particles are near a place.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <unordered_map>
 #include <vector>
 
 #include "isotrack/types.h"
@@ -14,9 +14,16 @@ namespace isotrack {
 class PointGrid {
 public:
     /// `cell_size`: world units, > 0; best near the usual query radius.
-    explicit PointGrid(double cell_size) : cell_size_(cell_size) {}
+    explicit PointGrid(double cell_size) : cell_size_(cell_size), buckets_(kFewest) {}
 
-    void insert(const Vec3& p, int index) { cells_[key(cell(p))].push_back({p, index}); }
+    void insert(const Vec3& p, int index) {
+        if (entries_.size() == buckets_.size()) {
+            buckets_.assign(2 * buckets_.size(), {});
+            for (std::size_t e = 0; e < entries_.size(); ++e) append(static_cast<int>(e));
+        }
+        entries_.push_back({p, key(cell(p)), index, kNone});
+        append(static_cast<int>(entries_.size()) - 1);
+    }
 
     /// Calls visit(index, squared distance) for every point within `radius` of p.
     template <typename Visit>
@@ -25,21 +32,36 @@ public:
         for (std::int64_t x = low[0]; x <= high[0]; ++x)
             for (std::int64_t y = low[1]; y <= high[1]; ++y)
                 for (std::int64_t z = low[2]; z <= high[2]; ++z) {
-                    const auto it = cells_.find(key({x, y, z}));
-                    if (it == cells_.end()) continue;
-                    for (const Entry& e : it->second) {
-                        const double d2 = (e.point - p).squaredNorm();
-                        if (d2 <= radius * radius) visit(e.index, d2);
+                    const std::uint64_t wanted = key({x, y, z});
+                    for (int e = buckets_[bucket(wanted)].first; e != kNone; e = entries_[e].next) {
+                        if (entries_[e].key != wanted) continue;
+                        const double d2 = (entries_[e].point - p).squaredNorm();
+                        if (d2 <= radius * radius) visit(entries_[e].index, d2);
                     }
                 }
     }
 
 private:
     using Cell = Eigen::Array<std::int64_t, 3, 1>;
+    static constexpr int kNone = -1;
+    static constexpr std::size_t kFewest = 64;  // a power of two
     struct Entry {
         Vec3 point;
-        int index;
+        std::uint64_t key;  // of its cell
+        int index, next;    // the next entry in its bucket
     };
+    struct Bucket {
+        int first = kNone, last = kNone;
+    };
+    void append(int e) {
+        entries_[e].next = kNone;
+        Bucket& of = buckets_[bucket(entries_[e].key)];
+        (of.first == kNone ? of.first : entries_[of.last].next) = e;
+        of.last = e;
+    }
+    std::size_t bucket(std::uint64_t key) const {
+        return (key * 0x9e3779b97f4a7c15u >> 32) & (buckets_.size() - 1);
+    }
     Cell cell(const Vec3& p) const { return (p / cell_size_).array().floor().cast<std::int64_t>(); }
     static std::uint64_t key(const Cell& c) {
         // Distinct for cells less than 2^21 apart; farther ones share a bucket, where the distance tells them
@@ -50,7 +72,8 @@ private:
     }
 
     double cell_size_;
-    std::unordered_map<std::uint64_t, std::vector<Entry>> cells_;
+    std::vector<Entry> entries_;  // in the order of insertion
+    std::vector<Bucket> buckets_;
 };
 
 }  // namespace isotrack
