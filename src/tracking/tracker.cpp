@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -46,6 +47,10 @@ constexpr double kDetailOfEdges = 0.25;
 constexpr double kCrossingsApart = 0.5;  // details: what lies between crossings is found from the triangles
 constexpr double kBandShare = 0.8;       // of the reach: interpolated values are right up to there
 constexpr int kCertifyRounds = 24;
+// Particles that are added at most, at a tolerance of half a detail. A clean level set takes a quarter of
+// that; one with holes in its band would take more than it has lattice edges.
+constexpr double kMostPerCrossing = 0.5;
+constexpr std::size_t kMostAnyway = 1000;
 constexpr int kFitSteps = 6;
 constexpr double kFitWideExponent = 0.5;
 constexpr int kBluntRounds = 3, kBluntPasses = 4;
@@ -166,20 +171,29 @@ struct Work {
         }
         Blunter blunter(mesh.vertices, mesh.carved.triangles, std::move(movable), surface,
                         kBluntShare * limits.tolerance);
-        const std::size_t missed_before = inspection.missed.size();
-        const auto misses_more = [&] {
+        const auto missed = [&] {
+            std::vector<std::array<double, 3>> places;
+            for (const auto& c : inspection.missed) places.push_back({c.point.x(), c.point.y(), c.point.z()});
+            std::sort(places.begin(), places.end());
+            return places;
+        };
+        const auto before = missed();
+        // What is missed now but was not before; nothing where not more is missed.
+        const auto newly_missed = [&] {
             for (const Blunting& change : blunter.changes())
                 if (change.vertex < 0)
                     for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
             inspection = inspector->inspect_both_ways(mesh);
-            return inspection.missed.size() > missed_before;
+            std::vector<Vec3> places;
+            if (inspection.missed.size() <= before.size()) return places;
+            for (const auto& p : missed())
+                if (!std::binary_search(before.begin(), before.end(), p))
+                    places.emplace_back(p[0], p[1], p[2]);
+            return places;
         };
         for (int round = 0; round < kBluntRounds && blunter.run(kBluntPasses); ++round)
-            while (misses_more()) {
-                std::vector<Vec3> places;
-                for (const auto& c : inspection.missed) places.push_back(c.point);
+            for (auto places = newly_missed(); !places.empty(); places = newly_missed())
                 if (!blunter.undo_near(places, limits.tolerance)) break;
-            }
     }
 
     TrackedFrame finish(Method method) {
@@ -436,8 +450,12 @@ struct Tracker::Impl {
     }
 
     /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
-    std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, const Surface& surface,
-                     const SizingLimits& l) {
+    std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, std::size_t crossings,
+                     const Surface& surface, const SizingLimits& l) {
+        const double finer = std::max(1.0, 0.5 * surface.resolution() / l.tolerance);
+        if (static_cast<double>(particles.size()) >
+            kMostAnyway + kMostPerCrossing * finer * static_cast<double>(crossings))
+            return 0;
         const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
         return densify(particles, shortages(mesh, inspection, dt->cells(), particles, surface, l), surface,
                        least, next_id);
@@ -581,6 +599,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         mesh = carve_mesh(surface, seconds);
         if (options.fit) fit_vertices(mesh, fitted, surface, seconds);
     };
+    const std::size_t crossing_count = work->crossings->crossings().size();
     // As long as many particles have to be added their surroundings make room for them.
     std::size_t added = 0;
     for (int mending = 0;; ++mending) {
@@ -592,7 +611,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         if (options.method == Method::Paper) break;
         inspection = mending == 0 ? inspector->inspect(mesh) : inspector->inspect_both_ways(mesh);
         memory.evidence.error = errors_at_particles(mesh, inspection.errors, particles.size());
-        added = mend(mesh, inspection, surface, l);
+        added = mend(mesh, inspection, crossing_count, surface, l);
         if (mending == kMostMendings ||
             static_cast<double>(added) < kFew * static_cast<double>(particles.size()))
             break;
@@ -606,7 +625,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         }
         const StageTimer timer(seconds, "certify");
         const bool last = options.method == Method::Paper || round == kCertifyRounds;
-        const auto passes = [&] { return last || mend(mesh, inspection, surface, l) == 0; };
+        const auto passes = [&] { return last || mend(mesh, inspection, crossing_count, surface, l) == 0; };
         inspection = inspector->inspect_both_ways(mesh);
         bool good = passes();
         if (good && options.fit && undo_crossing_fits(mesh)) {

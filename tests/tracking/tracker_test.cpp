@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <random>
 #include <set>
 #include <vector>
 
@@ -461,6 +462,38 @@ TEST(Tracker, KeepsEdgesWithinTheirBounds) {
     tracker.advance(*sphere_at({0, 0, 0}));
     for (const double h : tracker.particles().spacing) EXPECT_LE(h, 0.2);
     EXPECT_GT(tracker.particles().size(), 4.0 * 3.14 / (0.866 * 0.2 * 0.2) * 0.7);
+}
+
+TEST(Tracker, TakesNoMoreParticlesForABandFullOfHolesThanThereAreCrossings) {
+    const auto grid = rasterise(*sphere_at({0, 0, 0}), 0.03);
+    std::vector<openvdb::Coord> active;
+    for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel) active.push_back(voxel.getCoord());
+    std::mt19937 random(1);
+    for (const openvdb::Coord& c : active)
+        if (random() % 20 == 0) grid->tree().setValueOff(c, grid->background());
+    const LevelSet level_set(grid);
+    Tracker tracker(with_tolerance(0.015));
+    const TrackedFrame frame = tracker.advance(level_set);
+    EXPECT_LT(frame.particles, level_set.crossing_count());
+    const MeshTopology t = mesh_topology(frame.mesh);
+    EXPECT_TRUE(t.closed() && t.oriented() && t.manifold());
+    EXPECT_EQ(self_intersections(frame.mesh).size(), 0u);
+    EXPECT_FALSE(frame.within_tolerance);
+}
+
+TEST(Tracker, HoldsAToleranceBeyondTheBandToIt) {
+    const LevelSet level_set(rasterise(*sphere_at({0, 0, 0}), 0.02));
+    Tracker tracker(with_tolerance(0.2));
+    const TrackedFrame frame = tracker.advance(level_set);
+    EXPECT_LT(frame.tolerance, level_set.reach());
+    expect_sound(frame, 1, 2, "sphere");
+    const auto truth = sphere_at({0, 0, 0});
+    const auto probe = truth->probe();
+    for (const Triangle& t : frame.mesh.triangles) {
+        const Vec3 middle =
+            (frame.mesh.points[t[0]] + frame.mesh.points[t[1]] + frame.mesh.points[t[2]]) / 3.0;
+        EXPECT_LE(std::abs(probe->value(middle)), frame.tolerance + 1e-3);
+    }
 }
 
 TEST(Tracker, RefusesOptionsOutOfRange) {

@@ -72,7 +72,9 @@ struct TrackedFrame {
     double max_error = 0.0, rms_error = 0.0;
     bool opened = false;             ///< A cap was left out: the mesh has a border there.
     std::size_t lost_crossings = 0;  ///< Features below the grid's resolution that the mesh does not hold.
-    bool within_tolerance = true;    ///< max_error is at most the tolerance and nothing is lost.
+    /// max_error is at most the tolerance and nothing is lost. Not so, too, where following every detail
+    /// would take more particles than half the lattice crossings (at half a voxel; more at less).
+    bool within_tolerance = true;
     std::map<std::string, double>
         seconds;  ///< Per stage: carry, cover, size, relax, delaunay, convect, fit, certify, blunt.
 };
