@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 
 #include "delaunay/circumcentre.h"
 #include "surface/thread_probes.h"
@@ -172,10 +173,17 @@ double FacingTriangle::squared_distance(const Surface::Crossing& crossing, doubl
 void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                         const CrossingGrid& grid, double cutoff, std::vector<double>& distances) {
     const std::vector<Surface::Crossing>& crossings = grid.crossings();
-    std::vector<char> wanted(crossings.size());
-    for (std::size_t i = 0; i < crossings.size(); ++i) wanted[i] = distances[i] == kUnknownDistance;
-    if (std::find(wanted.begin(), wanted.end(), 1) == wanted.end()) return;
-    std::vector<LeastSquare> least(crossings.size());
+    std::vector<std::size_t> unknown;
+    for (std::size_t i = 0; i < crossings.size(); ++i)
+        if (distances[i] == kUnknownDistance) unknown.push_back(i);
+    if (unknown.empty()) return;
+    std::vector<char> wanted(crossings.size(), 0);
+    const std::unique_ptr<std::size_t[]> number(new std::size_t[crossings.size()]);  // of the unknown ones
+    std::vector<LeastSquare> least(unknown.size());
+    for (std::size_t u = 0; u < unknown.size(); ++u) {
+        wanted[unknown[u]] = 1;
+        number[unknown[u]] = u;
+    }
     const auto for_each_block = [](std::size_t count, const auto& body) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 64), [&](const auto& range) {
             for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
@@ -200,16 +208,16 @@ void crossing_distances(const std::vector<Vec3>& points, const std::vector<Trian
             const auto& [i, j, k] = near[t];
             const FacingTriangle triangle(points[i], points[j], points[k]);
             const auto measure = [&](std::size_t c) {
-                if (wanted[c])
-                    least[c].take(
-                        triangle.squared_distance(crossings[c], std::min(reach * reach, least[c].get())));
+                if (!wanted[c]) return;
+                LeastSquare& found = least[number[c]];
+                found.take(triangle.squared_distance(crossings[c], std::min(reach * reach, found.get())));
             };
             grid.for_each_in(box_around(near[t], reach), measure, &columns);
         });
         bool any = false;
-        for (std::size_t i = 0; i < crossings.size(); ++i) {
-            wanted[i] = wanted[i] && least[i].get() > reach * reach;
-            any = any || wanted[i];
+        for (std::size_t u = 0; u < unknown.size(); ++u) {
+            wanted[unknown[u]] = least[u].get() > reach * reach;
+            any = any || wanted[unknown[u]];
         }
         return any;
     };
@@ -219,9 +227,9 @@ void crossing_distances(const std::vector<Vec3>& points, const std::vector<Trian
         columns = grid.columns_of(wanted);
         search(cutoff);
     }
-    for (std::size_t i = 0; i < crossings.size(); ++i)
-        if (distances[i] == kUnknownDistance)
-            distances[i] = wanted[i] ? std::numeric_limits<double>::infinity() : std::sqrt(least[i].get());
+    for (std::size_t u = 0; u < unknown.size(); ++u)
+        distances[unknown[u]] =
+            wanted[unknown[u]] ? std::numeric_limits<double>::infinity() : std::sqrt(least[u].get());
 }
 
 std::vector<double> crossing_distances(const std::vector<Vec3>& points,

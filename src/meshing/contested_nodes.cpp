@@ -20,14 +20,25 @@ struct Hit {
     double z;
 };
 
-/// Twice the signed area of pqr in the plane; of a shared edge pq both triangles get the same bits but for
-/// the sign.
-double area2(const Vec3& p, const Vec3& q, double x, double y) {
-    const bool swap = std::tie(p.x(), p.y(), p.z()) > std::tie(q.x(), q.y(), q.z());
-    const Vec3 &a = swap ? q : p, &b = swap ? p : q;
-    const double area = (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x());
-    return swap ? -area : area;
-}
+/// An edge seen along the lines.
+class Edge {
+public:
+    Edge(const Vec3& p, const Vec3& q) {
+        const bool swap = std::tie(p.x(), p.y(), p.z()) > std::tie(q.x(), q.y(), q.z());
+        const Vec3 &a = swap ? q : p, &b = swap ? p : q;
+        x_ = a.x();
+        y_ = a.y();
+        dx_ = b.x() - x_;
+        dy_ = b.y() - y_;
+        sign_ = swap ? -1.0 : 1.0;
+    }
+    /// Twice the signed area of p, q and (x, y); of a shared edge both triangles get the same bits but for
+    /// the sign.
+    double area2(double x, double y) const { return sign_ * (dx_ * (y - y_) - dy_ * (x - x_)); }
+
+private:
+    double x_, y_, dx_, dy_, sign_;
+};
 
 std::vector<Hit> hits_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                          const std::vector<int>& component) {
@@ -36,10 +47,11 @@ std::vector<Hit> hits_of(const std::vector<Vec3>& points, const std::vector<Tria
     const auto add_hits = [&](std::size_t t, std::vector<Hit>& hits) {
         const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]], &c = points[triangles[t][2]];
         const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
+        const Edge bc(b, c), ca(c, a), ab(a, b);
         for (int x = static_cast<int>(std::ceil(low.x() - kBeside[0])); x + kBeside[0] <= high.x(); ++x)
             for (int y = static_cast<int>(std::ceil(low.y() - kBeside[1])); y + kBeside[1] <= high.y(); ++y) {
                 const double px = x + kBeside[0], py = y + kBeside[1];
-                const double wa = area2(b, c, px, py), wb = area2(c, a, px, py), wc = area2(a, b, px, py);
+                const double wa = bc.area2(px, py), wb = ca.area2(px, py), wc = ab.area2(px, py);
                 if (!((wa > 0.0 && wb > 0.0 && wc > 0.0) || (wa < 0.0 && wb < 0.0 && wc < 0.0))) continue;
                 hits.push_back({x, y, component[t], (wa * a.z() + wb * b.z() + wc * c.z()) / (wa + wb + wc)});
             }
@@ -126,9 +138,7 @@ bool is_contested(const Layer& layer, const Layer::Line& line, std::size_t pair,
 
 Contested contested_nodes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                           const std::vector<int>& component, int components, const LatticeSides& sides) {
-    const LatticeLayers<Hit> hits(hits_of(points, triangles, component), [](const Hit& a, const Hit& b) {
-        return std::tie(a.y, a.z) < std::tie(b.y, b.z);
-    });
+    const LatticeLayers<Hit> hits(hits_of(points, triangles, component));
     const LatticeSides::Uprights& uprights = sides.uprights();
     if (hits.empty() && uprights.empty()) return {{}, std::vector<char>(components, 0)};
     const int low_x = hits.empty()       ? uprights.low_x()

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <tuple>
 
 #include "isotrack/meshing/lattice_topology.h"
 
@@ -12,8 +11,7 @@ LatticeSides::LatticeSides(const Surface& surface) : surface_(surface), diagonal
     std::vector<Upright> uprights;
     for (const Eigen::Vector3i& node : surface.upright_crossings())
         uprights.push_back({node.x(), node.y(), node.z()});
-    uprights_ = Uprights(
-        uprights, [](const Upright& a, const Upright& b) { return std::tie(a.y, a.z) < std::tie(b.y, b.z); });
+    uprights_ = Uprights(uprights);
 }
 
 LatticeSides::Uprights::Range LatticeSides::line(int x, int y) const {

@@ -144,6 +144,26 @@ std::vector<Surface::Diagonal> parted_diagonals(const std::vector<Vec3>& points,
     return result;
 }
 
+/// Visits 0 to `count` - 1 in order, then those that visits ask to look at again, in order, until none is
+/// left.
+template <typename Visit>
+void visit_until_rest(std::size_t count, const Visit& visit) {
+    std::vector<std::size_t> again;
+    std::vector<char> listed(count, 0);
+    const auto look_again = [&](std::size_t other) {
+        if (!listed[other]) again.push_back(other);
+        listed[other] = 1;
+    };
+    for (std::size_t w = 0; w < count; ++w) visit(w, look_again);
+    while (!again.empty()) {
+        std::vector<std::size_t> now;
+        now.swap(again);
+        std::sort(now.begin(), now.end());
+        for (const std::size_t w : now) listed[w] = 0;
+        for (const std::size_t w : now) visit(w, look_again);
+    }
+}
+
 }  // namespace
 
 LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
@@ -236,26 +256,25 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
                 }
         return false;
     };
-    for (bool any = true; any;) {
-        any = false;
-        for (std::size_t w = 0; w < wrong.size(); ++w) {
-            if (!lost[w] || !is_held(w)) continue;
-            lost[w] = 0;
-            any = true;
-        }
-    }
+    const auto for_each_wrong_around = [&](std::size_t w, const auto& visit) {
+        for (int bit = 0; bit < 27; ++bit)
+            if (const int other = around[w].wrong[bit]; other >= 0)
+                visit(static_cast<std::size_t>(other), bit);
+    };
+    visit_until_rest(wrong.size(), [&](std::size_t w, const auto& look_again) {
+        if (!lost[w] || !is_held(w)) return;
+        lost[w] = 0;
+        for_each_wrong_around(w, [&](std::size_t other, int) { look_again(other); });
+    });
     std::vector<char> put_right(wrong.size(), 0);
-    for (bool any = true; any;) {
-        any = false;
-        for (std::size_t w = 0; w < wrong.size(); ++w) {
-            if (put_right[w] || lost[w] || !is_simple(around[w].inside)) continue;
-            put_right[w] = 1;
-            any = true;
-            for (int bit = 0; bit < 27; ++bit)  // bit 26 - b is the way back
-                if (const int other = around[w].wrong[bit]; other >= 0)
-                    around[other].inside ^= 1u << (26 - bit);
-        }
-    }
+    visit_until_rest(wrong.size(), [&](std::size_t w, const auto& look_again) {
+        if (put_right[w] || lost[w] || !is_simple(around[w].inside)) return;
+        put_right[w] = 1;
+        for_each_wrong_around(w, [&](std::size_t other, int bit) {
+            around[other].inside ^= 1u << (26 - bit);  // the way back
+            look_again(other);
+        });
+    });
     for (std::size_t w = 0; w < wrong.size(); ++w)
         if (!put_right[w]) result.faults.push_back(lattice * Vec3(wrong[w][0], wrong[w][1], wrong[w][2]));
     result.parted = parted_diagonals(points, triangles, sides.diagonals());

@@ -94,11 +94,11 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
 std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection& result) {
     const std::vector<Surface::Crossing>& crossings = crossings_.crossings();
     const double cutoff = kLostAt * limits_.tolerance;
-    std::vector<char> missed_before(crossings.size(), 0);
+    const std::vector<std::size_t> missed_before = std::move(missed_);  // ascending
+    missed_.clear();
     if (distances_.empty()) {
         distances_.assign(crossings.size(), kUnknownDistance);
     } else {
-        for (std::size_t c = 0; c < crossings.size(); ++c) missed_before[c] = is_missed(distances_[c]);
         // What was nearest to a triangle that went is to be measured again; what is nearer to one that came
         // than to all before is measured now.
         const double same = 1e-6 * cutoff;  // rounding
@@ -131,22 +131,40 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
     crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff, distances_);
     reached_ = facets_;
 
-    std::vector<Vec3> in_vain;
+    struct Block {
+        std::vector<std::size_t> missed;
+        std::size_t lost = 0;
+        double farthest = 0.0, sum = 0.0;
+    };
+    constexpr std::size_t kBlock = 32768;
+    std::vector<Block> blocks((crossings.size() + kBlock - 1) / kBlock);
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+        Block& block = blocks[b];
+        for (std::size_t c = b * kBlock; c < std::min(crossings.size(), (b + 1) * kBlock); ++c) {
+            if (is_missed(distances_[c])) block.missed.push_back(c);
+            if (!std::isfinite(distances_[c])) {
+                ++block.lost;
+                continue;
+            }
+            block.farthest = std::max(block.farthest, distances_[c]);
+            block.sum += distances_[c] * distances_[c];
+        }
+    });
     double sum = 0.0;
-    for (std::size_t c = 0; c < crossings.size(); ++c) {
-        if (is_missed(distances_[c])) {
-            result.missed.push_back(crossings[c]);
-            if (missed_before[c]) in_vain.push_back(crossings[c].point);
-        }
-        if (!std::isfinite(distances_[c])) {
-            ++result.lost_crossings;
-            continue;
-        }
-        result.farthest_crossing = std::max(result.farthest_crossing, distances_[c]);
-        sum += distances_[c] * distances_[c];
+    for (const Block& block : blocks) {
+        missed_.insert(missed_.end(), block.missed.begin(), block.missed.end());
+        result.lost_crossings += block.lost;
+        result.farthest_crossing = std::max(result.farthest_crossing, block.farthest);
+        sum += block.sum;
     }
     const std::size_t found = crossings.size() - result.lost_crossings;
     if (found > 0) result.crossings_mean_square = sum / static_cast<double>(found);
+    std::vector<Vec3> in_vain;
+    for (const std::size_t c : missed_) {
+        result.missed.push_back(crossings[c]);
+        if (std::binary_search(missed_before.begin(), missed_before.end(), c))
+            in_vain.push_back(crossings[c].point);
+    }
     return in_vain;
 }
 

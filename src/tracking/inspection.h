@@ -64,6 +64,7 @@ private:
     std::vector<TriangleError> errors_;  // of each
     std::vector<Facet> reached_;         // of the last inspection of the crossings
     std::vector<double> distances_;      // to them, per crossing
+    std::vector<std::size_t> missed_;    // of the crossings
     std::optional<LatticeSides> sides_;
     int looks_ = 0;  // at the topology
 };

@@ -5,21 +5,21 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 namespace isotrack {
 
-/// Items with a member x, sorted by it and within each layer by a criterion of one's own.
+/// Items with members x, y and z, ascending in these.
 template <typename Item>
 class LatticeLayers {
 public:
     using Range = std::pair<const Item*, const Item*>;
 
     LatticeLayers() = default;
-    /// `less` compares items of one layer.
-    template <typename Less>
-    LatticeLayers(const std::vector<Item>& items, const Less& less) {
+    explicit LatticeLayers(const std::vector<Item>& items) {
         if (items.empty()) return;
         const auto [low, high] = std::minmax_element(items.begin(), items.end(),
                                                      [](const Item& a, const Item& b) { return a.x < b.x; });
@@ -31,8 +31,7 @@ public:
         items_.resize(items.size());
         for (const Item& item : items) items_[end[item.x - low_x_]++] = item;
         tbb::parallel_for(std::size_t{0}, first_.size() - 1, [&](std::size_t i) {
-            std::sort(items_.begin() + static_cast<std::ptrdiff_t>(first_[i]),
-                      items_.begin() + static_cast<std::ptrdiff_t>(first_[i + 1]), less);
+            sort_layer(items_.data() + first_[i], items_.data() + first_[i + 1]);
         });
     }
 
@@ -47,6 +46,32 @@ public:
     }
 
 private:
+    static void sort_layer(Item* begin, Item* end) {
+        constexpr std::size_t kLinesPerItem = 8;
+        const auto less = [](const Item& a, const Item& b) {
+            return std::tie(a.y, a.z) < std::tie(b.y, b.z);
+        };
+        const auto count = static_cast<std::size_t>(end - begin);
+        if (count < 2) return;
+        const auto [low, high] =
+            std::minmax_element(begin, end, [](const Item& a, const Item& b) { return a.y < b.y; });
+        const int low_y = low->y;
+        const auto lines = static_cast<std::size_t>(static_cast<std::int64_t>(high->y) - low_y + 1);
+        if (lines > kLinesPerItem * count) {
+            std::sort(begin, end, less);
+            return;
+        }
+        // Each to its line, where there are few.
+        std::vector<std::size_t> first(lines + 1, 0);
+        for (const Item* item = begin; item != end; ++item) ++first[item->y - low_y + 1];
+        for (std::size_t line = 1; line <= lines; ++line) first[line] += first[line - 1];
+        std::vector<std::size_t> next(first.begin(), first.end() - 1);
+        const std::vector<Item> unsorted(begin, end);
+        for (const Item& item : unsorted) begin[next[item.y - low_y]++] = item;
+        for (std::size_t line = 0; line < lines; ++line)
+            std::sort(begin + first[line], begin + first[line + 1], less);
+    }
+
     int low_x_ = 0;
     std::vector<Item> items_;
     std::vector<std::size_t> first_ = {0};  // of each layer, and the end
