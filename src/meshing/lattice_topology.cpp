@@ -144,46 +144,13 @@ std::vector<Surface::Diagonal> parted_diagonals(const std::vector<Vec3>& points,
     return result;
 }
 
-/// Visits 0 to `count` - 1 in order, then those that visits ask to look at again, in order, until none is
-/// left.
-template <typename Visit>
-void visit_until_rest(std::size_t count, const Visit& visit) {
-    std::vector<std::size_t> again;
-    std::vector<char> listed(count, 0);
-    const auto look_again = [&](std::size_t other) {
-        if (!listed[other]) again.push_back(other);
-        listed[other] = 1;
-    };
-    for (std::size_t w = 0; w < count; ++w) visit(w, look_again);
-    while (!again.empty()) {
-        std::vector<std::size_t> now;
-        now.swap(again);
-        std::sort(now.begin(), now.end());
-        for (const std::size_t w : now) listed[w] = 0;
-        for (const std::size_t w : now) visit(w, look_again);
-    }
-}
+/// The nodes around one that is wrong.
+struct Around {
+    std::uint32_t inside = 0;  // as the mesh has them
+    int wrong[27];             // their numbers among the wrong ones, or -1
+};
 
-}  // namespace
-
-LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                                 const LatticeSides& sides) {
-    const Surface& surface = sides.surface();
-    const Eigen::Affine3d lattice = sides.surface().lattice(), to_lattice = lattice.inverse();
-    std::vector<Vec3> in_lattice;
-    in_lattice.reserve(points.size());
-    for (const Vec3& p : points) in_lattice.push_back(to_lattice * p);
-    int components = 0;
-    const std::vector<int> component = component_of_triangles(points.size(), triangles, components);
-    const auto [wrong, holds_node] = contested_nodes(in_lattice, triangles, component, components, sides);
-    LatticeTopology result;
-    for (const int c : component) result.speck.push_back(!holds_node[c]);
-
-    // The sides of the nodes around each as the mesh has them, and which of those are wrong.
-    struct Around {
-        std::uint32_t inside = 0;
-        int wrong[27];
-    };
+std::vector<Around> look_around(const std::vector<Node>& wrong, const LatticeSides& sides) {
     std::vector<Around> around(wrong.size());
     // The first wrong node from `node` on, which is not before `at` and seldom far.
     const auto from = [&](std::vector<Node>::const_iterator at, const Node& node) {
@@ -194,7 +161,8 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
         }
         return std::lower_bound(at, wrong.end() - at > step ? at + step : wrong.end(), node);
     };
-    ThreadProbes probes(surface);
+    ThreadProbes probes(sides.surface());
+    const Eigen::Affine3d lattice = sides.surface().lattice();
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, wrong.size(), 64), [&](const auto& range) {
         Surface::Probe& own_probe = probes.local();
         // The lines around a node, and the first of the wrong nodes that are not below: both only go up.
@@ -235,6 +203,44 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
                 }
         }
     });
+    return around;
+}
+
+/// Visits 0 to `count` - 1 in order, then those that visits ask to look at again, in order, until none is
+/// left.
+template <typename Visit>
+void visit_until_rest(std::size_t count, const Visit& visit) {
+    std::vector<std::size_t> again;
+    std::vector<char> listed(count, 0);
+    const auto look_again = [&](std::size_t other) {
+        if (!listed[other]) again.push_back(other);
+        listed[other] = 1;
+    };
+    for (std::size_t w = 0; w < count; ++w) visit(w, look_again);
+    while (!again.empty()) {
+        std::vector<std::size_t> now;
+        now.swap(again);
+        std::sort(now.begin(), now.end());
+        for (const std::size_t w : now) listed[w] = 0;
+        for (const std::size_t w : now) visit(w, look_again);
+    }
+}
+
+}  // namespace
+
+LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                 const LatticeSides& sides) {
+    const Eigen::Affine3d lattice = sides.surface().lattice(), to_lattice = lattice.inverse();
+    std::vector<Vec3> in_lattice;
+    in_lattice.reserve(points.size());
+    for (const Vec3& p : points) in_lattice.push_back(to_lattice * p);
+    int components = 0;
+    const std::vector<int> component = component_of_triangles(points.size(), triangles, components);
+    const auto [wrong, holds_node] = contested_nodes(in_lattice, triangles, component, components, sides);
+    LatticeTopology result;
+    for (const int c : component) result.speck.push_back(!holds_node[c]);
+
+    std::vector<Around> around = look_around(wrong, sides);
     // Inside nodes that hang together, none of them inside the mesh, are a component that is lost even where
     // a corner joins them to others.
     std::vector<std::uint32_t> truth(wrong.size());

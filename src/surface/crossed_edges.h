@@ -40,9 +40,8 @@ struct CrossedEdges {
 /// has voxels at its surface.
 CrossedEdges find_crossed_edges(const openvdb::FloatTree& tree);
 
-/// Indices of those that stand for all when two edges that cross the same way and are in the same cube of
-/// `cube` voxels need not both be looked at: of each cube the edges along the axis that most of its edges
-/// follow, one outward, one inward. `cube`: 1, 2, 4 or 8.
+/// Indices of some that stand for all: in each cube of `cube` voxels of a leaf, along the axis that most of its
+/// edges follow, one that goes out and one that goes in. `cube`: 1, 2, 4 or 8.
 std::vector<std::size_t> thin_out(const CrossedEdges& crossed, int cube);
 
 }  // namespace isotrack

@@ -240,8 +240,9 @@ struct Tracker::Impl {
         return std::min(options.tolerance, kBandShare * surface.reach());
     }
 
-    /// What is smaller need not be looked at, world units.
+    /// What is smaller need not be looked at, world units. In the paper's method the tolerance has no say.
     double detail(const Surface& surface) const {
+        if (options.method == Method::Paper) return surface.resolution();
         double enough = kDetail * tolerance(surface);
         if (options.max_edge) enough = std::min(enough, kDetailOfEdges * *options.max_edge);
         return std::max(surface.resolution(), enough);

@@ -80,8 +80,8 @@ public:
     /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
     /// in the same order.
     std::vector<Crossing> crossings() const { return crossings(0.0); }
-    /// One of those within a cube of an edge up to `apart` may stand for others there, but never one that
-    /// goes in for one that goes out along the same axis. This default scans `bounds()` and gives all.
+    /// Of those within a cube of an edge up to `apart` some along one axis may stand for all: one that goes out
+    /// and one that goes in, where there are both. This default scans `bounds()` and gives all.
     virtual std::vector<Crossing> crossings(double apart) const;
     /// The lower ends of the crossed edges along the lattice's third axis, in any order.
     virtual std::vector<Eigen::Vector3i> upright_crossings() const;
