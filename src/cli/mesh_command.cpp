@@ -145,8 +145,9 @@ void add_mesh_command(CLI::App& app, int& result) {
         ->capture_default_str();
     mesh->add_option("--angle", a->angle,
                      "Wanted angle between neighbour normals, degrees (default 60, with --method paper 20)");
-    mesh->add_option("--min-edge", a->min_edge, "Smallest particle spacing (default 0.5vx)");
-    mesh->add_option("--max-edge", a->max_edge, "Largest particle spacing (default 40vx)");
+    mesh->add_option("--min-edge", a->min_edge,
+                     "Smallest particle spacing (default 0.5vx, or the tolerance)");
+    mesh->add_option("--max-edge", a->max_edge, "Largest particle spacing (default 80 of the smallest)");
     mesh->add_option("--frames", a->frames, "A:B or A:B:STEP, ends included");
     mesh->add_option("--grid", a->grid, "Level-set grid, NAME or NAME[i]");
     mesh->add_option("--velocity-grid", a->velocity_grid, "Velocity grid, NAME or NAME[i]");

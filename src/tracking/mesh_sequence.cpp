@@ -135,18 +135,21 @@ void check_outputs(const InputSequence& input, const std::string& output,
     if (failure) throw OptionError("cannot make the folder '" + folder.string() + "': " + failure.message());
 }
 
-std::map<std::string, std::string> effective_settings(const MeshSequenceOptions& options, double voxel_size) {
-    const TrackerOptions t = tracker_options(options, voxel_size);
+std::map<std::string, std::string> effective_settings(const MeshSequenceOptions& options,
+                                                      const LevelSet& level_set) {
+    const double voxel_size = level_set.voxel_size();
+    const SizingLimits limits = sizing_limits(tracker_options(options, voxel_size), level_set);
     std::map<std::string, std::string> s;
     const auto length = [&](double world) {
         char text[96];
         std::snprintf(text, sizeof text, "%.6g (%.4gvx)", world, world / voxel_size);
         return std::string(text);
     };
-    s["tolerance"] = length(t.tolerance);
-    s["min_edge"] = length(t.min_edge.value_or(0.5 * voxel_size));
-    s["max_edge"] = length(t.max_edge.value_or(40.0 * voxel_size));
-    s["angle"] = std::to_string(std::lround(t.angle_deg.value_or(default_angle_deg(t.method)))) + " degrees";
+    s["tolerance"] = length(limits.tolerance);
+    s["min_edge"] = length(limits.min_edge);
+    s["max_edge"] = length(limits.max_edge);
+    s["angle"] = std::to_string(std::lround(options.angle_deg.value_or(default_angle_deg(options.method)))) +
+                 " degrees";
     s["method"] = options.method == Method::Paper ? "paper" : "tolerance";
     s["border"] = options.border == Border::Open ? "open" : "close";
     s["delaunay"] = name_of(options.delaunay);
@@ -303,7 +306,7 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         if (!tracker && !read.level_set->empty()) {
             const TrackerOptions resolved = tracker_options(options, read.level_set->voxel_size());
             tracker.emplace(resolved);
-            report.settings = effective_settings(options, read.level_set->voxel_size());
+            report.settings = effective_settings(options, *read.level_set);
             if (events.started) events.started(report);
         }
         Tracker::Motion motion;

@@ -44,6 +44,7 @@ constexpr double kFollowThinning = 0.6;           // what certify added last liv
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr double kDetail = 2.0;       // tolerances
 constexpr double kDetailOfEdges = 0.25;
+constexpr double kLeastEdge = 0.5, kLargestEdge = 40.0;  // details
 constexpr double kCrossingsApart = 0.5;  // details: what lies between crossings is found from the triangles
 constexpr double kBandShare = 0.8;       // of the reach: interpolated values are right up to there
 constexpr int kCertifyRounds = 24;
@@ -144,6 +145,18 @@ void round_to_float(Particles& particles) {
     for (Vec3& p : particles.position) p = to_float_precision(p);
 }
 
+double tolerance_of(const TrackerOptions& options, const Surface& surface) {
+    return std::min(options.tolerance, kBandShare * surface.reach());
+}
+
+/// What is smaller need not be looked at, world units. In the paper's method the tolerance has no say.
+double detail_of(const TrackerOptions& options, const Surface& surface) {
+    if (options.method == Method::Paper) return surface.resolution();
+    double enough = kDetail * tolerance_of(options, surface);
+    if (options.max_edge) enough = std::min(enough, kDetailOfEdges * *options.max_edge);
+    return std::max(surface.resolution(), enough);
+}
+
 /// A frame in the making.
 struct Work {
     const Surface& surface;
@@ -234,29 +247,6 @@ struct Tracker::Impl {
     UpdateStrategy strategy() const {
         const bool as_in_paper = options.method == Method::Paper && options.delaunay == UpdateStrategy::Auto;
         return as_in_paper ? UpdateStrategy::Lazy : options.delaunay;
-    }
-
-    double tolerance(const Surface& surface) const {
-        return std::min(options.tolerance, kBandShare * surface.reach());
-    }
-
-    /// What is smaller need not be looked at, world units. In the paper's method the tolerance has no say.
-    double detail(const Surface& surface) const {
-        if (options.method == Method::Paper) return surface.resolution();
-        double enough = kDetail * tolerance(surface);
-        if (options.max_edge) enough = std::min(enough, kDetailOfEdges * *options.max_edge);
-        return std::max(surface.resolution(), enough);
-    }
-
-    SizingLimits limits(const Surface& surface) const {
-        SizingLimits l{};
-        l.tolerance = tolerance(surface);
-        l.angle = options.angle_deg.value_or(default_angle_deg(options.method)) * kPi / 180.0;
-        l.angle_floor = kAngleFloor * detail(surface);
-        l.min_edge = options.min_edge.value_or(0.5 * detail(surface));
-        l.max_edge = std::max(options.max_edge.value_or(40.0 * detail(surface)), l.min_edge);
-        l.wide_exponent = options.fit ? kFitWideExponent : 0.0;
-        return l;
     }
 
     /// Where each particle is expected on the new surface. A velocity field may be in a unit nobody knows and
@@ -567,7 +557,8 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
 }
 
 Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motion) {
-    const auto work = std::make_shared<Work>(Work{surface, limits(surface), {}, {}, {}, {}, {}});
+    const auto work =
+        std::make_shared<Work>(Work{surface, sizing_limits(options, surface), {}, {}, {}, {}, {}});
     const SizingLimits& l = work->limits;
     TrackedFrame& frame = work->frame;
     FrameMesh& mesh = work->mesh;
@@ -586,7 +577,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     }
     {
         const StageTimer timer(seconds, "cover");
-        work->crossings.emplace(surface, kCrossingsApart * detail(surface));
+        work->crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
         frame.seeded = cover(particles, surface, *work->crossings, l, options.seed, next_id);
     }
     if (options.method == Method::Paper)
@@ -666,6 +657,18 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     for (const Vec3& p : frame.mesh.points) at_border.push_back(surface.at_border(p));
     frame.opened = open_border(frame.mesh, at_border, next_id) > 0;
     return [work] { return std::move(work->frame); };
+}
+
+SizingLimits sizing_limits(const TrackerOptions& options, const Surface& surface) {
+    const double detail = detail_of(options, surface);
+    SizingLimits l{};
+    l.tolerance = tolerance_of(options, surface);
+    l.angle = options.angle_deg.value_or(default_angle_deg(options.method)) * kPi / 180.0;
+    l.angle_floor = kAngleFloor * detail;
+    l.min_edge = options.min_edge.value_or(kLeastEdge * detail);
+    l.max_edge = std::max(options.max_edge.value_or(kLargestEdge * detail), l.min_edge);
+    l.wide_exponent = options.fit ? kFitWideExponent : 0.0;
+    return l;
 }
 
 double default_angle_deg(Method method) {

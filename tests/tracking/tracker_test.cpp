@@ -481,6 +481,23 @@ TEST(Tracker, TakesNoMoreParticlesForABandFullOfHolesThanThereAreCrossings) {
     EXPECT_FALSE(frame.within_tolerance);
 }
 
+TEST(Tracker, SaysWhatTheOptionsComeTo) {
+    const auto sphere = sphere_at({0, 0, 0});
+    const SizingLimits fine = sizing_limits(with_tolerance(0.2 * kVoxel), *sphere),
+                       coarse = sizing_limits(with_tolerance(3.0 * kVoxel), *sphere);
+    EXPECT_DOUBLE_EQ(fine.min_edge, 0.5 * kVoxel);
+    EXPECT_DOUBLE_EQ(fine.max_edge, 40.0 * kVoxel);
+    EXPECT_DOUBLE_EQ(coarse.min_edge, 3.0 * kVoxel);
+    EXPECT_DOUBLE_EQ(coarse.max_edge, 240.0 * kVoxel);
+    TrackerOptions as_in_paper = with_tolerance(3.0 * kVoxel);
+    as_in_paper.method = Method::Paper;
+    EXPECT_DOUBLE_EQ(sizing_limits(as_in_paper, *sphere).min_edge, 0.5 * kVoxel);
+    TrackerOptions bounded = with_tolerance(3.0 * kVoxel);
+    bounded.max_edge = 2.0 * kVoxel;
+    EXPECT_DOUBLE_EQ(sizing_limits(bounded, *sphere).max_edge, 2.0 * kVoxel);
+    EXPECT_LE(sizing_limits(bounded, *sphere).min_edge, 2.0 * kVoxel);
+}
+
 TEST(Tracker, HoldsAToleranceBeyondTheBandToIt) {
     const LevelSet level_set(rasterise(*sphere_at({0, 0, 0}), 0.02));
     Tracker tracker(with_tolerance(0.2));

@@ -10,6 +10,7 @@
 
 #include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/sampling/particles.h"
+#include "isotrack/sampling/sizing.h"
 #include "isotrack/surface/surface.h"
 #include "isotrack/types.h"
 
@@ -43,8 +44,9 @@ struct TrackerOptions {
     double tolerance = 0.0;
     std::optional<double> angle_deg;  ///< Wanted angle between neighbours' normals, degrees in (0, 90].
                                       ///< Unset: `default_angle_deg`.
-    std::optional<double> min_edge;   ///< Smallest spacing. Unset: half the surface's resolution.
-    std::optional<double> max_edge;   ///< Largest spacing. Unset: 40 times the surface's resolution.
+    std::optional<double> min_edge;   ///< Smallest spacing. Unset: half the surface's resolution or the
+                                      ///< tolerance, whichever is larger (in the paper's method the former).
+    std::optional<double> max_edge;   ///< Largest spacing. Unset: 80 times that.
     Method method = Method::Tolerance;
     Reconstruction reconstruction = Reconstruction::Guided;
     Border border = Border::Close;
@@ -52,6 +54,9 @@ struct TrackerOptions {
     bool fit = false;  ///< Vertices leave the surface so that the triangles are nearer to it; particles stay.
     std::uint64_t seed = 1;  ///< Same seed, same surfaces: same meshes, at any thread count.
 };
+
+/// What these options come to on a surface.
+SizingLimits sizing_limits(const TrackerOptions& options, const Surface& surface);
 
 /// What became of one frame.
 struct TrackedFrame {
