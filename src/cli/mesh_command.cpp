@@ -82,8 +82,9 @@ void summarise(const RunReport& report, const std::string& output, double second
         ++written;
     }
     if (written > 0)
-        spdlog::info("{} meshes written to {}: {} to {} triangles, largest error {:.3f} voxels, {}; {:.1f} s",
-                     written, output, least, most, error,
+        spdlog::info("{} written to {}: {} triangles, largest error {:.3f} voxels, {}; {:.1f} s",
+                     written == 1 ? "1 mesh" : fmt::format("{} meshes", written), output,
+                     least == most ? std::to_string(most) : fmt::format("{} to {}", least, most), error,
                      unsound == 0 ? "all closed, manifold and free of self-intersections"
                                   : fmt::format("{} not sound", unsound),
                      seconds);
