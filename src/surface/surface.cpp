@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "surface/lattice_scan.h"
+
 namespace isotrack {
 namespace {
 
@@ -64,38 +66,12 @@ std::vector<Surface::Crossing> Surface::crossings(double) const {
     std::vector<Crossing> result;
     const Box box = bounds();
     if (box.isEmpty()) return result;
-    const double h = resolution();
-    const Eigen::Array3i n = nodes_across(box, h);
-    const Vec3 origin = lattice().translation();
-    const auto access = probe();
-
-    // Two layers of values at a time: the layer x and the one after it.
-    const std::size_t layer_size = static_cast<std::size_t>(n.y()) * n.z();
-    std::vector<double> here(layer_size), next(layer_size);
-    const auto fill = [&](int x, std::vector<double>& layer) {
-        for (int y = 0; y < n.y(); ++y)
-            for (int z = 0; z < n.z(); ++z)
-                layer[static_cast<std::size_t>(y) * n.z() + z] = access->value(origin + h * Vec3(x, y, z));
-    };
-    const auto cross = [&](double a, double b, const Vec3& at, int axis) {
-        if ((a < 0.0) == (b < 0.0)) return;
-        const float direction = a < 0.0 ? 1.0f : -1.0f;
-        result.push_back(
-            {at + h * (a / (a - b)) * Vec3::Unit(axis), direction * Eigen::Vector3f::Unit(axis)});
-    };
-    fill(0, next);
-    for (int x = 0; x < n.x(); ++x) {
-        here.swap(next);
-        if (x + 1 < n.x()) fill(x + 1, next);
-        for (int y = 0; y < n.y(); ++y)
-            for (int z = 0; z < n.z(); ++z) {
-                const std::size_t i = static_cast<std::size_t>(y) * n.z() + z;
-                const Vec3 at = origin + h * Vec3(x, y, z);
-                if (x + 1 < n.x()) cross(here[i], next[i], at, 0);
-                if (y + 1 < n.y()) cross(here[i], here[i + n.z()], at, 1);
-                if (z + 1 < n.z()) cross(here[i], here[i + 1], at, 2);
-            }
-    }
+    const Eigen::Affine3d from_lattice = lattice();
+    scan_lattice(*probe(), from_lattice, Vec3::Zero(), nodes_across(box, resolution()),
+                 [&](const Vec3& node, int axis, double fraction, bool outward) {
+                     result.push_back({from_lattice * (node + fraction * Vec3::Unit(axis)),
+                                       (outward ? 1.0f : -1.0f) * Eigen::Vector3f::Unit(axis)});
+                 });
     return result;
 }
 

@@ -8,6 +8,7 @@
 
 #include "meshing/sharpness.h"
 #include "sampling/compact.h"
+#include "surface/lattice_scan.h"
 
 namespace isotrack {
 namespace {
@@ -198,22 +199,10 @@ void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspectio
         const Vec3 middle = to_lattice * place;
         const Vec3 from = (middle - extent).array().floor(), to = (middle + extent).array().ceil();
         const Eigen::Array3i size = (to - from).cast<int>().array() + 1;
-        std::vector<double> values;
-        for (int x = 0; x < size.x(); ++x)
-            for (int y = 0; y < size.y(); ++y)
-                for (int z = 0; z < size.z(); ++z)
-                    values.push_back(probe->value(lattice * (from + Vec3(x, y, z))));
-        const int stride[3] = {size.y() * size.z(), size.z(), 1};
-        for (int i = 0; i < static_cast<int>(values.size()); ++i) {
-            const int at[3] = {i / stride[0], i / stride[1] % size.y(), i % size.z()};
-            for (int axis = 0; axis < 3; ++axis) {
-                if (at[axis] + 1 == size[axis]) continue;
-                const double a = values[i], b = values[i + stride[axis]];
-                if ((a < 0.0) == (b < 0.0)) continue;
-                const Vec3 p = lattice * (from + Vec3(at[0], at[1], at[2]) + a / (a - b) * Vec3::Unit(axis));
-                if ((p - place).norm() <= reach) found.push_back({p.x(), p.y(), p.z()});
-            }
-        }
+        scan_lattice(*probe, lattice, from, size, [&](const Vec3& node, int axis, double fraction, bool) {
+            const Vec3 p = lattice * (node + fraction * Vec3::Unit(axis));
+            if ((p - place).norm() <= reach) found.push_back({p.x(), p.y(), p.z()});
+        });
     }
     std::sort(found.begin(), found.end());
     found.erase(std::unique(found.begin(), found.end()), found.end());
