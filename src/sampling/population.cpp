@@ -120,11 +120,11 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
 }
 
 std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface,
-                    double min_spacing, Id& next_id) {
+                    double min_spacing, std::size_t most, Id& next_id) {
     constexpr double kApart = 0.7, kShrink = 0.6;
     constexpr int kAround = 6;
     constexpr double kGoldenAngle = 2.399963;
-    if (shortages.empty()) return 0;
+    if (shortages.empty() || particles.size() >= most) return 0;
     PointGrid grid(2.0 * surface.resolution());
     for (std::size_t i = 0; i < particles.size(); ++i)
         grid.insert(particles.position[i], static_cast<int>(i));
@@ -135,6 +135,7 @@ std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages
     /// that is already there.
     const auto add = [&](const Vec3& place, double h) {
         int nearest = -1;
+        if (particles.size() >= most) return nearest;
         const auto p = probe->project(place);
         if (!p) return nearest;
         const Vec3 n = probe->normal(*p);

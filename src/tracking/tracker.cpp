@@ -34,13 +34,18 @@ namespace isotrack {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr int kColdRounds = 12, kWarmRounds = 2;
-constexpr int kSweepsPerRound = 3, kMendingSweeps = 3;
+constexpr int kColdRounds = 4, kWarmRounds = 2;
+constexpr int kMendingSweeps = 3;
 constexpr int kMostMendings = 3;
 constexpr double kFew = 0.01;  // of the particles: few enough to be added by certify, without relaxation
-constexpr int kFollowSweeps = 3;
-constexpr PopulationBand kFollowBand{0.6, 0.85};  // wider: ids live longer
-constexpr double kFollowThinning = 0.6;           // what certify added last lives longer
+/// How fast the population goes after the wanted spacing.
+struct Pace {
+    PopulationBand band;
+    double thinning;
+    int sweeps;
+};
+constexpr Pace kAtFirst{{}, 0.3, 6};
+constexpr Pace kFollowing{{0.6, 0.85}, 0.6, 3};  // ids live longer, and so does what certify added last
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr double kDetail = 2.0;       // tolerances
 constexpr double kDetailOfEdges = 0.25;
@@ -424,17 +429,6 @@ struct Tracker::Impl {
         return std::find(undo.begin(), undo.end(), 1) != undo.end();
     }
 
-    void size(const FrameMesh& mesh, const Adjacency& adjacency, const Surface& surface,
-              const SizingLimits& l) {
-        constexpr int kSizingSteps = 3;  // barycentric lattice of the samples: with the centroid
-        SizingEvidence evidence;
-        evidence.thickness = thickness_of(particles, dt->cells());
-        evidence.error = errors_at_particles(
-            mesh, triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps),
-            particles.size());
-        update_spacing(particles, adjacency, evidence, l);
-    }
-
     /// Who repels whom: particles may change places with neighbours before the next mesh is made.
     Adjacency two_rings(const FrameMesh& mesh) const {
         return ring_of(particle_triangles(mesh.carved), particles.size()).squared();
@@ -444,12 +438,11 @@ struct Tracker::Impl {
     std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, std::size_t crossings,
                      const Surface& surface, const SizingLimits& l) {
         const double finer = std::max(1.0, 0.5 * surface.resolution() / l.tolerance);
-        if (static_cast<double>(particles.size()) >
-            kMostAnyway + kMostPerCrossing * finer * static_cast<double>(crossings))
-            return 0;
+        const auto most =
+            kMostAnyway + static_cast<std::size_t>(kMostPerCrossing * finer * static_cast<double>(crossings));
         const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
         return densify(particles, shortages(mesh, inspection, dt->cells(), particles, surface, l), surface,
-                       least, next_id);
+                       least, most, next_id);
     }
 
     /// The newborn move like the neighbours that were there before; alone among newborn they rest.
@@ -469,7 +462,7 @@ struct Tracker::Impl {
             if (count[i] > 0) particles.velocity[i] /= count[i];
     }
 
-    void follow(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
+    void follow(const Surface& surface, const SizingLimits& l, const Pace& pace, TrackedFrame& frame);
     void make_room(const Surface& surface, TrackedFrame& frame);
     void remember(const FrameMesh& mesh);
     void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
@@ -477,8 +470,9 @@ struct Tracker::Impl {
     Finish begin(const Surface& surface, const Motion& motion);
 };
 
-/// Rounds of: mesh, measure, size, relax, births and deaths. More of them the more particles are new.
+/// Rounds of: mesh, measure, follow. More of them the more particles are new.
 void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame) {
+    constexpr int kSizingSteps = 3;  // barycentric lattice of the samples: with the centroid
     auto& seconds = frame.seconds;
     const double fresh =
         particles.empty() ? 0.0 : static_cast<double>(frame.seeded) / static_cast<double>(particles.size());
@@ -491,18 +485,14 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool w
         FrameMesh mesh = carve_mesh(surface, seconds);
         Fitted none;
         if (options.fit) fit_vertices(mesh, none, surface, seconds);
-        const Adjacency adjacency = vertex_adjacency(dt->cells(), particles.size());
         {
             const StageTimer timer(seconds, "size");
-            size(mesh, adjacency, surface, l);
+            memory.evidence.error = errors_at_particles(
+                mesh, triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps),
+                particles.size());
+            remember(mesh);
         }
-        const StageTimer timer(seconds, "relax");
-        frame.sweeps += relax(particles, two_rings(mesh), surface, kSweepsPerRound);
-        if (round + 1 == rounds) break;
-        auto keep = uncrowded(particles, adjacency);
-        fill_sparse(particles, particle_triangles(mesh.carved), adjacency, surface, next_id);
-        keep.resize(particles.size(), 1);
-        particles.retain(keep);
+        follow(surface, l, kAtFirst, frame);
     }
 }
 
@@ -514,24 +504,25 @@ void Tracker::Impl::make_room(const Surface& surface, TrackedFrame& frame) {
     frame.sweeps += relax(particles, two_rings(mesh), surface, kMendingSweeps);
 }
 
-/// What the last mesh knows is good enough for the next frame's particles: no DT is needed.
-void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, TrackedFrame& frame) {
+/// Spacing, births and deaths, then sweeps, by what the last mesh knows: no DT is needed.
+void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const Pace& pace,
+                           TrackedFrame& frame) {
     {
         const StageTimer timer(frame.seconds, "size");
         memory.grow(particles.size());
-        SizingLimits slow = l;
-        slow.thinning = kFollowThinning;
-        update_spacing(particles, memory.ring, memory.evidence, slow);
+        SizingLimits paced = l;
+        paced.thinning = pace.thinning;
+        update_spacing(particles, memory.ring, memory.evidence, paced);
     }
     const StageTimer timer(frame.seconds, "relax");
-    auto keep = uncrowded(particles, memory.ring, kFollowBand);
+    auto keep = uncrowded(particles, memory.ring, pace.band);
     const std::vector<Triangle> parents =
-        fill_sparse(particles, memory.triangles, memory.ring.squared(), surface, next_id, kFollowBand);
+        fill_sparse(particles, memory.triangles, memory.ring.squared(), surface, next_id, pace.band);
     memory.grow(particles.size(), parents);
     keep.resize(particles.size(), 1);
     particles.retain(keep);
     memory.retain(keep);
-    frame.sweeps += relax(particles, memory.ring.squared(), surface, kFollowSweeps);
+    frame.sweeps += relax(particles, memory.ring.squared(), surface, pace.sweeps);
 }
 
 void Tracker::Impl::remember(const FrameMesh& mesh) {
@@ -583,7 +574,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
     else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))
-        follow(surface, l, frame);
+        follow(surface, l, kFollowing, frame);
     else
         sample(surface, l, warm, frame);
     Fitted fitted;

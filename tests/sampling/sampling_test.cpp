@@ -433,13 +433,26 @@ TEST(Adjacency, RingSquareGapsAndNewborn) {
     EXPECT_TRUE(list(more, 7).empty());
 }
 
+TEST(Densify, StopsAtTheMostThatMayBe) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    Particles particles;
+    particles.add({0, 0, 1}, {0, 0, 1}, 0.4, 0);
+    Id next_id = 1;
+    const std::vector<Shortage> places = {{{0, 0, 1}, 0.4}, {{1, 0, 0}, 0.4}, {{0, 1, 0}, 0.4}};
+    EXPECT_EQ(densify(particles, places, *sphere, 0.05, 1, next_id), 0u);
+    EXPECT_EQ(densify(particles, places, *sphere, 0.05, 5, next_id), 4u);
+    EXPECT_EQ(particles.size(), 5u);
+    EXPECT_EQ(densify(particles, places, *sphere, 0.05, 5, next_id), 0u);
+}
+
 TEST(Densify, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
     const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
     Particles particles;
     particles.add({0, 0, 1}, {0, 0, 1}, 0.4, 0);
     Id next_id = 1;
-    EXPECT_EQ(densify(particles, {}, *sphere, 0.05, next_id), 0u);
-    EXPECT_EQ(densify(particles, {{{1.1, 0, 0}, 0.4}}, *sphere, 0.05, next_id), 1u);
+    constexpr std::size_t kMany = 1000;
+    EXPECT_EQ(densify(particles, {}, *sphere, 0.05, kMany, next_id), 0u);
+    EXPECT_EQ(densify(particles, {{{1.1, 0, 0}, 0.4}}, *sphere, 0.05, kMany, next_id), 1u);
     ASSERT_EQ(particles.size(), 2u);
     EXPECT_NEAR((particles.position[1] - Vec3(1, 0, 0)).norm(), 0.0, 1e-4);
     EXPECT_EQ(particles.id[1], 1);
@@ -448,7 +461,7 @@ TEST(Densify, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
     double ring = 0.4;
     for (int calls = 0; calls < 20; ++calls) {
         const std::size_t before = particles.size();
-        const std::size_t added = densify(particles, {{{0, 0, 1}, 0.4}}, *sphere, 0.05, next_id);
+        const std::size_t added = densify(particles, {{{0, 0, 1}, 0.4}}, *sphere, 0.05, kMany, next_id);
         EXPECT_EQ(particles.size(), before + added);
         if (added == 0) break;
         ring *= 0.6;

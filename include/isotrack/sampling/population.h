@@ -39,9 +39,9 @@ struct Shortage {
 /// Adds particles at the projections of `shortages`, in their order, at least 0.7 of their spacing from
 /// particles that face the same way. A particle that is nearer is surrounded instead: its spacing becomes 0.6
 /// of the smaller of its own and the wanted one, down to `min_spacing`, and six more are added around it at
-/// that distance, so that repeated calls get denser. Returns how many were added: 0 means that nothing more
-/// can be done.
+/// that distance, so that repeated calls get denser. There will be no more than `most` particles. Returns how
+/// many were added: 0 means that nothing more can be done.
 std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface,
-                    double min_spacing, Id& next_id);
+                    double min_spacing, std::size_t most, Id& next_id);
 
 }  // namespace isotrack
