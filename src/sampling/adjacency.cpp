@@ -1,5 +1,6 @@
 #include "isotrack/sampling/adjacency.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -94,19 +95,26 @@ Adjacency Adjacency::squared() const {
         std::vector<int> count, adjacent;
     };
     std::vector<Block> blocks((size() + kBlock - 1) / kBlock);
+    // Per thread: the particle whose list somebody was put on last.
+    tbb::enumerable_thread_specific<std::vector<int>> listed_by([&] { return std::vector<int>(size(), -1); });
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
         Block& block = blocks[b];
+        std::vector<int>& listed = listed_by.local();
         for (std::size_t i = b * kBlock; i < std::min(size(), (b + 1) * kBlock); ++i) {
             const auto start = static_cast<std::ptrdiff_t>(block.adjacent.size());
-            for (const int j : of(i)) {
+            const int self = static_cast<int>(i);
+            listed[i] = self;
+            const auto list = [&](int j) {
+                if (listed[j] == self) return;
+                listed[j] = self;
                 block.adjacent.push_back(j);
-                block.adjacent.insert(block.adjacent.end(), of(j).begin(), of(j).end());
+            };
+            for (const int j : of(i)) {
+                list(j);
+                for (const int k : of(j)) list(k);
             }
-            const auto from = block.adjacent.begin() + start;
-            auto to = std::remove(from, block.adjacent.end(), static_cast<int>(i));
-            std::sort(from, to);
-            block.adjacent.erase(std::unique(from, to), block.adjacent.end());
-            block.count.push_back(static_cast<int>(block.adjacent.end() - from));
+            std::sort(block.adjacent.begin() + start, block.adjacent.end());
+            block.count.push_back(static_cast<int>(block.adjacent.end() - block.adjacent.begin() - start));
         }
     });
     Adjacency result;

@@ -39,6 +39,8 @@ CoordinateDescentReport coordinate_descent(Particles& particles, MovingNeighbour
     std::mt19937_64 random(options.seed);
     std::vector<char> alive(particles.size(), 1), queued(particles.size(), 1);
     std::vector<double> lambda(particles.size(), 0.1);
+    std::vector<Metric> metrics;
+    for (std::size_t i = 0; i < particles.size(); ++i) metrics.push_back(metric_of(particles, i));
     std::deque<int> candidates;
     for (std::size_t i = 0; i < particles.size(); ++i) candidates.push_back(static_cast<int>(i));
     const auto push = [&](int i) {
@@ -63,8 +65,10 @@ CoordinateDescentReport coordinate_descent(Particles& particles, MovingNeighbour
         ++report.steps;
         structure.neighbours(i, neighbours);
         particles.spacing[i] = spacing_in_paper(particles, neighbours, i, limits);
-        const DescentStep step = descend(
-            particles, {neighbours.data(), neighbours.data() + neighbours.size()}, i, lambda[i], *probe);
+        metrics[i] = metric_of(particles, i);
+        const DescentStep step =
+            descend(particles, metrics, {neighbours.data(), neighbours.data() + neighbours.size()}, i,
+                    lambda[i], *probe);
         if (step.moved > 0.0) structure.moved(i, particles.position[i]);
         if (step.moved > kRestThreshold) {
             push(i);
@@ -92,6 +96,7 @@ CoordinateDescentReport coordinate_descent(Particles& particles, MovingNeighbour
             alive.push_back(1);
             queued.push_back(0);
             lambda.push_back(0.1);
+            metrics.push_back(metrics[i]);
             ++report.born;
             structure.added(twin, *p, i);
             push(i);

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sampling/metric.h"
-
 namespace isotrack {
 namespace {
 
@@ -28,15 +26,16 @@ struct Surroundings {
     double sigma2 = 0.0;
     double nearest = 0.0;  // world units
 
-    Surroundings(const Particles& particles, Adjacency::Range neighbours, int i)
-        : metric(metric_of(particles, i)) {
+    Surroundings(const Particles& particles, const std::vector<Metric>& metrics, Adjacency::Range neighbours,
+                 int i)
+        : metric(metrics[i]) {
         const Vec3& p = particles.position[i];
         const Vec3& n = particles.normal[i];
         double least = 1e300, least_world = 1e300;
         for (const int j : neighbours) {
             if (!(n.dot(particles.normal[j]) > 0.0) || count == kMostNeighbours) continue;
             const Vec3 r = particles.position[j] - p;
-            list[count] = {particles.position[j], metric_of(particles, j)};
+            list[count] = {particles.position[j], metrics[j]};
             least = std::min(least, list[count].square(metric, r));
             least_world = std::min(least_world, r.squaredNorm());
             ++count;
@@ -66,9 +65,9 @@ void tangent_frame(const Vec3& n, Vec3& a, Vec3& b) {
 
 }  // namespace
 
-DescentStep descend(Particles& particles, Adjacency::Range neighbours, int i, double& lambda,
-                    Surface::Probe& probe) {
-    const Surroundings near(particles, neighbours, i);
+DescentStep descend(Particles& particles, const std::vector<Metric>& metrics, Adjacency::Range neighbours,
+                    int i, double& lambda, Surface::Probe& probe) {
+    const Surroundings near(particles, metrics, neighbours, i);
     if (near.count == 0 || !(near.sigma2 > 0.0)) return {};
     const double sigma = std::sqrt(near.sigma2);
     const Vec3 p = particles.position[i];

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <limits>
+#include <vector>
 
 #include "isotrack/sampling/adjacency.h"
 #include "isotrack/sampling/particles.h"
 #include "isotrack/surface/surface.h"
+#include "sampling/metric.h"
 
 namespace isotrack {
 
@@ -20,9 +22,10 @@ struct DescentStep {
 
 /// The paper's algorithm 2 for particle i: a Levenberg-Marquardt step on the Gaussian energy of those
 /// `neighbours` that face the same way and are within 2 sigma, in the tangent plane, in the metric d^2 =
-/// (k_i^2 + k_j^2) / 2 |r|^2 with k = 1 / spacing, stretched as the particles say; projected by O1; undone
+/// (k_i^2 + k_j^2) / 2 |r|^2 with k = 1 / spacing, stretched as the particles say (`metrics`: of each);
+/// projected by O1; undone
 /// unless the energy falls. `lambda` is the particle's damping, kept from step to step.
-DescentStep descend(Particles& particles, Adjacency::Range neighbours, int i, double& lambda,
-                    Surface::Probe& probe);
+DescentStep descend(Particles& particles, const std::vector<Metric>& metrics, Adjacency::Range neighbours,
+                    int i, double& lambda, Surface::Probe& probe);
 
 }  // namespace isotrack

@@ -76,7 +76,7 @@ struct MetricTriangle {
 }  // namespace
 
 std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triangle>& triangles,
-                                  const Adjacency& adjacency, const Surface& surface, Id& next_id,
+                                  const Adjacency& ring, const Surface& surface, Id& next_id,
                                   const PopulationBand& band) {
     std::vector<std::pair<double, int>> large;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
@@ -104,9 +104,13 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
             return n.dot(particles.normal[j]) > 0.0 &&
                    triangle.square(particles.position[j] - *p) < kEmpty * kEmpty;
         };
+        const auto any_near = [&](int j) {
+            const Adjacency::Range beside = ring.of(j);
+            return is_near(j) || std::any_of(beside.begin(), beside.end(), is_near);
+        };
         if (std::any_of(triangles[t].begin(), triangles[t].end(), [&](int corner) {
-                const Adjacency::Range near = adjacency.of(corner);
-                return is_near(corner) || std::any_of(near.begin(), near.end(), is_near);
+                const Adjacency::Range beside = ring.of(corner);
+                return std::any_of(beside.begin(), beside.end(), any_near);
             }))
             continue;
         const Vec3 velocity = (particles.velocity[a] + particles.velocity[b] + particles.velocity[c]) / 3.0;

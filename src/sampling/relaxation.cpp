@@ -10,6 +10,8 @@ namespace isotrack {
 int relax(Particles& particles, const Adjacency& adjacency, const Surface& surface, int sweeps) {
     const auto groups = colour_groups(adjacency);
     ThreadProbes probes(surface);
+    std::vector<Metric> metrics;
+    for (std::size_t i = 0; i < particles.size(); ++i) metrics.push_back(metric_of(particles, i));
     std::vector<double> lambda(particles.size(), 0.1);
     std::vector<char> moved(particles.size(), 1), active(particles.size(), 1);
     int done = 0;
@@ -28,8 +30,9 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
                 Surface::Probe& probe = probes.local();
                 for (std::size_t g = range.begin(); g < range.end(); ++g) {
                     const int i = group[g];
-                    moved[i] = active[i] && descend(particles, adjacency.of(i), i, lambda[i], probe).moved >
-                                                kRestThreshold;
+                    moved[i] =
+                        active[i] && descend(particles, metrics, adjacency.of(i), i, lambda[i], probe).moved >
+                                         kRestThreshold;
                 }
             });
     }

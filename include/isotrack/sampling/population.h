@@ -23,11 +23,11 @@ std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacen
                             const PopulationBand& band = {});
 
 /// Adds a particle at the projected circumcentre of triangles (of particle indices) that are too large,
-/// largest first, none beside another, unless a neighbour of a corner is within 0.8 of the spacing of that
-/// place: the triangles need not be those of a DT. Returns the triangle of each that was added; they take its
-/// mean spacing.
+/// largest first, none beside another, unless a particle up to two steps of `ring` from a corner is within
+/// 0.8 of the spacing of that place: the triangles need not be those of a DT. Returns the triangle of each
+/// that was added; they take its mean spacing.
 std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triangle>& triangles,
-                                  const Adjacency& adjacency, const Surface& surface, Id& next_id,
+                                  const Adjacency& ring, const Surface& surface, Id& next_id,
                                   const PopulationBand& band = {});
 
 /// A place where the mesh fails, and the spacing that would mend it.
