@@ -67,28 +67,44 @@ std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector
     return result;
 }
 
+void Inspector::expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles) {
+    expected_.emplace(particles.size(), triangles);
+    expected_errors_ =
+        triangle_errors(particles, expected_->triangles(), surface_, kSteps, kSuspect * limits_.tolerance);
+}
+
 std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
-    constexpr int kNone = -1;
     std::vector<Facet> facets = facets_of(mesh.carved, mesh.vertices);
-    std::vector<int> known(facets.size(), kNone);
+    std::vector<const TriangleError*> known(facets.size(), nullptr);
+    std::vector<char> seen(facets.size(), 0);  // in the mesh before
     compare(
-        facets, facets_, [&](std::size_t f, std::size_t old) { known[f] = static_cast<int>(old); },
-        [](std::size_t) {}, [](std::size_t) {});
+        facets, facets_,
+        [&](std::size_t f, std::size_t old) {
+            known[f] = &errors_[old];
+            seen[f] = 1;
+        },
+        [&](std::size_t f) {
+            const auto [corner, whole] = corners_of(mesh.carved, f);
+            const int e = expected_ && whole ? expected_->find(corner) : -1;
+            if (e >= 0) known[f] = &expected_errors_[e];
+        },
+        [](std::size_t) {});
     std::vector<Triangle> fresh;
     for (std::size_t f = 0; f < facets.size(); ++f)
-        if (known[f] == kNone) fresh.push_back(mesh.carved.triangles[f]);
+        if (!known[f]) fresh.push_back(from_least_corner(mesh.carved.triangles[f]));
     const auto errors = triangle_errors(mesh.vertices, fresh, surface_, kSteps, kSuspect * limits_.tolerance);
     auto next = errors.begin();
     std::vector<Vec3> in_vain;
     const auto probe = surface_.probe();
-    for (const int old : known) {
-        result.errors.push_back(old == kNone ? *next++ : errors_[old]);
+    for (std::size_t f = 0; f < facets.size(); ++f) {
+        result.errors.push_back(known[f] ? *known[f] : *next++);
         const TriangleError& error = result.errors.back();
-        if (error.largest > kCertified * limits_.tolerance && (old != kNone || !probe->project(error.where)))
+        if (error.largest > kCertified * limits_.tolerance && (seen[f] || !probe->project(error.where)))
             in_vain.push_back(error.where);
     }
     facets_ = std::move(facets);
     errors_ = result.errors;
+    expected_.reset();  // vertices may move from now on
     return in_vain;
 }
 
@@ -105,7 +121,7 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
         const double same = 1e-6 * cutoff;  // rounding
         const auto for_each_near = [&](const Facet& facet, const auto& body) {
             const auto& [a, b, c] = facet.corner;
-            const Vec3 reach = Vec3::Constant(cutoff), low = a.cwiseMin(b).cwiseMin(c).cast<double>(),
+            const Vec3 reach = Vec3::Constant(reach_), low = a.cwiseMin(b).cwiseMin(c).cast<double>(),
                        high = a.cwiseMax(b).cwiseMax(c).cast<double>();
             const FacingTriangle triangle(a.cast<double>(), b.cast<double>(), c.cast<double>());
             crossings_.for_each_in(Box(low - reach, high + reach), [&](std::size_t i) {
@@ -158,6 +174,7 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
         result.farthest_crossing = std::max(result.farthest_crossing, block.farthest);
         sum += block.sum;
     }
+    reach_ = result.lost_crossings > 0 ? cutoff : result.farthest_crossing;
     const std::size_t found = crossings.size() - result.lost_crossings;
     if (found > 0) result.crossings_mean_square = sum / static_cast<double>(found);
     std::vector<Vec3> in_vain;

@@ -12,6 +12,7 @@
 #include "isotrack/sampling/sizing.h"
 #include "isotrack/tracking/tracker.h"
 #include "tracking/facets.h"
+#include "tracking/triangle_index.h"
 
 namespace isotrack {
 
@@ -42,6 +43,10 @@ public:
     Inspector(const Surface& surface, const SizingLimits& limits, const CrossingGrid& crossings)
         : surface_(surface), limits_(limits), crossings_(crossings) {}
 
+    /// Before the first mesh is there: measures triangles that it is likely to have. Where it does, with
+    /// vertices on these very places, nothing is measured again.
+    void expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles);
+
     /// From mesh to surface alone.
     Inspection inspect(const FrameMesh& mesh);
     /// From mesh to surface and back.
@@ -60,11 +65,14 @@ private:
     const Surface& surface_;
     const SizingLimits& limits_;
     const CrossingGrid& crossings_;
-    std::vector<Facet> facets_;          // of the last inspection
-    std::vector<TriangleError> errors_;  // of each
-    std::vector<Facet> reached_;         // of the last inspection of the crossings
-    std::vector<double> distances_;      // to them, per crossing
-    std::vector<std::size_t> missed_;    // of the crossings
+    std::optional<TriangleIndex> expected_;       // before the first inspection, of particles
+    std::vector<TriangleError> expected_errors_;  // of each
+    double reach_ = 0.0;                          // the largest of the distances, at most the cutoff
+    std::vector<Facet> facets_;                   // of the last inspection
+    std::vector<TriangleError> errors_;           // of each
+    std::vector<Facet> reached_;                  // of the last inspection of the crossings
+    std::vector<double> distances_;               // to them, per crossing
+    std::vector<std::size_t> missed_;             // of the crossings
     std::optional<LatticeSides> sides_;
     int looks_ = 0;  // at the topology
 };

@@ -1,6 +1,7 @@
 #include "isotrack/tracking/tracker.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <array>
@@ -109,6 +110,10 @@ struct Memory {
     std::vector<Triangle> triangles;
     SizingEvidence evidence;
 
+    void take(std::vector<Triangle> of_mesh, std::size_t count) {
+        triangles = std::move(of_mesh);
+        ring = ring_of(triangles, count);
+    }
     void retain(const std::vector<char>& keep) {
         compact(evidence.error, keep);
         compact(evidence.thickness, keep);
@@ -429,11 +434,6 @@ struct Tracker::Impl {
         return std::find(undo.begin(), undo.end(), 1) != undo.end();
     }
 
-    /// Who repels whom: particles may change places with neighbours before the next mesh is made.
-    Adjacency two_rings(const FrameMesh& mesh) const {
-        return ring_of(particle_triangles(mesh.carved), particles.size()).squared();
-    }
-
     /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
     std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, std::size_t crossings,
                      const Surface& surface, const SizingLimits& l) {
@@ -501,7 +501,8 @@ void Tracker::Impl::make_room(const Surface& surface, TrackedFrame& frame) {
     tetrahedralise(false, frame.seconds);
     const FrameMesh mesh = carve_mesh(surface, frame.seconds);
     const StageTimer timer(frame.seconds, "relax");
-    frame.sweeps += relax(particles, two_rings(mesh), surface, kMendingSweeps);
+    memory.take(particle_triangles(mesh.carved), particles.size());
+    frame.sweeps += relax(particles, memory.ring.squared(), surface, kMendingSweeps);
 }
 
 /// Spacing, births and deaths, then sweeps, by what the last mesh knows: no DT is needed.
@@ -517,7 +518,7 @@ void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const 
     const StageTimer timer(frame.seconds, "relax");
     auto keep = uncrowded(particles, memory.ring, pace.band);
     const std::vector<Triangle> parents =
-        fill_sparse(particles, memory.triangles, memory.ring.squared(), surface, next_id, pace.band);
+        fill_sparse(particles, memory.triangles, memory.ring, surface, next_id, pace.band);
     memory.grow(particles.size(), parents);
     keep.resize(particles.size(), 1);
     particles.retain(keep);
@@ -526,10 +527,9 @@ void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const 
 }
 
 void Tracker::Impl::remember(const FrameMesh& mesh) {
-    memory.triangles = particle_triangles(mesh.carved);
+    memory.take(particle_triangles(mesh.carved), particles.size());
     memory.evidence.error.resize(particles.size(), -1.0);
     memory.evidence.thickness = thickness_of(particles, dt->cells());
-    memory.ring = ring_of(memory.triangles, particles.size());
 }
 
 void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm,
@@ -586,8 +586,16 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     // As long as many particles have to be added their surroundings make room for them.
     std::size_t added = 0;
     for (int mending = 0;; ++mending) {
-        tetrahedralise(true, seconds);
         inspector.emplace(surface, l, *work->crossings);
+        round_to_float(particles);
+        tbb::task_group beside;  // the DT, which keeps one thread alone busy
+        if (!options.fit && options.method != Method::Paper)
+            beside.run([&] { inspector->expect(particles.position, memory.triangles); });
+        tetrahedralise(true, seconds);
+        {
+            const StageTimer timer(seconds, "certify");
+            beside.wait();
+        }
         fitted = {};
         make_mesh();
         const StageTimer timer(seconds, "certify");

@@ -1,0 +1,43 @@
+// Triangles found by their corners.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// The same triangle from its least corner on.
+inline Triangle from_least_corner(Triangle t) {
+    std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+    return t;
+}
+
+/// Oriented triangles over so many vertices. Read-only, so threads may share it.
+class TriangleIndex {
+public:
+    TriangleIndex(std::size_t vertices, const std::vector<Triangle>& triangles)
+        : first_(vertices + 1, 0), triangles_(triangles) {
+        for (Triangle& t : triangles_) t = from_least_corner(t);
+        std::sort(triangles_.begin(), triangles_.end());
+        for (const Triangle& t : triangles_) ++first_[t[0] + 1];
+        for (std::size_t v = 0; v < vertices; ++v) first_[v + 1] += first_[v];
+    }
+    /// From their least corners on, ascending.
+    const std::vector<Triangle>& triangles() const { return triangles_; }
+    /// The number among `triangles()` of the one with these corners in this order, or -1.
+    int find(const Triangle& corners) const {
+        const Triangle t = from_least_corner(corners);
+        if (t[0] < 0 || static_cast<std::size_t>(t[0]) + 1 >= first_.size()) return -1;
+        for (int i = first_[t[0]]; i < first_[t[0] + 1]; ++i)
+            if (triangles_[i] == t) return i;
+        return -1;
+    }
+
+private:
+    std::vector<int> first_;  // of those from a vertex on
+    std::vector<Triangle> triangles_;
+};
+
+}  // namespace isotrack
