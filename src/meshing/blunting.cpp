@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kSharp = 1.7320508075688772;  // cotangent of 30 degrees
 constexpr double kFacing = 0.5;                // cosine to the surface normal, at least
+constexpr double kOwn = 1.03;                  // of the tolerance: crossings that near are of a triangle
 constexpr int kSteps = 6;                      // barycentric lattice of the error samples
 
 Box box_of(const std::vector<Vec3>& points, const Triangle& t) {
@@ -68,20 +69,60 @@ double BluntedMesh::facing(const std::vector<Triangle>& some) const {
     return least;
 }
 
-bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, double facing_before) const {
-    if (!(facing(candidates) > std::min(kFacing, facing_before))) return false;
-    return std::all_of(candidates.begin(), candidates.end(), [&](const Triangle& t) {
-        return triangle_error(points[t[0]], points[t[1]], points[t[2]], probe, kSteps, 0.5 * tolerance)
-                   .largest <= tolerance;
+Replaced BluntedMesh::replaced(const std::vector<Triangle>& some) const {
+    Replaced result{facing(some), {}, {}};
+    for (const Triangle& t : some) {
+        result.triangles.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
+        result.box.extend(box_of(points, t));
+    }
+    return result;
+}
+
+/// Crossings farther from the old triangles than the tolerance are the concern of others.
+bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>& candidates) const {
+    std::vector<FacingTriangle> after;
+    for (const Triangle& t : candidates) after.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
+    const double own2 = kOwn * tolerance * kOwn * tolerance, tolerance2 = tolerance * tolerance;
+    const Vec3 reach = Vec3::Constant(kOwn * tolerance);
+    bool all = true;
+    crossings.for_each_in(Box(before.box.min() - reach, before.box.max() + reach), [&](std::size_t c) {
+        if (!all) return;
+        const Surface::Crossing& crossing = crossings.crossings()[c];
+        double least = own2;
+        bool own = false;
+        for (const FacingTriangle& t : before.triangles) {
+            const double d2 = t.squared_distance(crossing, least);
+            if (d2 > least) continue;
+            least = d2;
+            own = true;
+        }
+        if (!own) return;
+        const double limit = std::max(least, tolerance2);
+        all = std::any_of(after.begin(), after.end(), [&](const FacingTriangle& t) {
+            return t.squared_distance(crossing, limit) <= limit;
+        });
     });
+    return all;
+}
+
+bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replaced& before) const {
+    if (!(facing(candidates) > std::min(kFacing, before.facing))) return false;
+    return std::all_of(candidates.begin(), candidates.end(),
+                       [&](const Triangle& t) {
+                           return triangle_error(points[t[0]], points[t[1]], points[t[2]], probe, kSteps,
+                                                 0.5 * tolerance)
+                                      .largest <= tolerance;
+                       }) &&
+           reach_what(before, candidates);
 }
 
 Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
-                 const Surface& surface, double tolerance)
+                 const Surface& surface, const CrossingGrid& crossings, double tolerance)
     : points_(points),
       triangles_(triangles),
       movable_(std::move(movable)),
       surface_(surface),
+      crossings_(crossings),
       tolerance_(tolerance),
       open_(points.size(), 1),
       unchecked_(triangles.size(), 0) {}
@@ -108,13 +149,13 @@ bool Blunter::pass() {
     std::sort(sharp.begin(), sharp.end());
     const std::size_t before = changes_.size();
     const auto probe = surface_.probe();
-    BluntedMesh mesh{points_,    triangles_, Corners(points_.size(), triangles_), movable_,
-                     tolerance_, *probe,     std::vector<char>(points_.size(), 0)};
+    BluntedMesh mesh{points_, triangles_, Corners(points_.size(), triangles_), movable_, tolerance_,
+                     *probe,  crossings_, std::vector<char>(points_.size(), 0)};
     for (const auto& [sharpest, t] : sharp) {
         for (const int v : triangles_[t])
             if (mesh.touched[v]) open_[v] = 1;
         auto change = flip(mesh, t, -sharpest);
-        if (!change) change = nudge(mesh, t);
+        if (!change) change = nudge(mesh, t, -sharpest);
         if (!change) continue;
         for (const int changed : change->triangle) {
             unchecked_[changed] = 1;

@@ -5,9 +5,17 @@
 #include <vector>
 
 #include "isotrack/meshing/blunting.h"
+#include "isotrack/meshing/certify.h"
 #include "meshing/corners.h"
 
 namespace isotrack {
+
+/// What a change would replace.
+struct Replaced {
+    double facing;  ///< The least cosine between normals of its triangles and the surface's.
+    std::vector<FacingTriangle> triangles;
+    Box box;
+};
 
 /// A mesh in the course of a pass.
 struct BluntedMesh {
@@ -17,14 +25,18 @@ struct BluntedMesh {
     const std::vector<char>& movable;
     double tolerance;
     Surface::Probe& probe;
+    const CrossingGrid& crossings;
     std::vector<char> touched;  ///< Per vertex: a change is near.
 
     double sharpness_of(const Triangle& t) const;
-    /// The least cosine between their normals and the surface's.
+    Replaced replaced(const std::vector<Triangle>& some) const;
+    /// Whether all these triangles face the way the surface does, or no worse than those they stand for, are
+    /// within the tolerance of it, and keep what those stand for of the crossings within the tolerance.
+    bool may_have(const std::vector<Triangle>& candidates, const Replaced& before) const;
+
+private:
     double facing(const std::vector<Triangle>& some) const;
-    /// Whether all these triangles face the way the surface does, or no worse than those they stand for, and
-    /// are within the tolerance of it.
-    bool may_have(const std::vector<Triangle>& candidates, double facing_before) const;
+    bool reach_what(const Replaced& before, const std::vector<Triangle>& candidates) const;
 };
 
 constexpr double kBluntGain = 0.9;  // of the cotangent, at most, for a change to be worth it
@@ -33,6 +45,6 @@ constexpr double kBluntGain = 0.9;  // of the cotangent, at most, for a change t
 std::optional<Blunting> flip(BluntedMesh& mesh, int triangle, double sharpness);
 
 /// Another place for one of its corners.
-std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle);
+std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness);
 
 }  // namespace isotrack

@@ -36,7 +36,7 @@ std::optional<Blunting> flip(BluntedMesh& mesh, int triangle, double sharpness) 
     const double before = std::max(sharpness, mesh.sharpness_of(triangles[other]));
     if (!(std::max(mesh.sharpness_of(first), mesh.sharpness_of(second)) < kBluntGain * before))
         return std::nullopt;
-    if (!mesh.may_have({first, second}, mesh.facing({old, triangles[other]}))) return std::nullopt;
+    if (!mesh.may_have({first, second}, mesh.replaced({old, triangles[other]}))) return std::nullopt;
     Blunting result{{triangle, other}, {old, triangles[other]}};
     triangles[triangle] = first;
     triangles[other] = second;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -15,6 +16,7 @@ namespace {
 constexpr int kWays = 8;                              // that are tried from each place
 constexpr double kFirstStep = 0.3, kLastStep = 0.02;  // of the mean edge
 constexpr int kHalvings = 2;                          // of a move that leaves the tolerance
+constexpr double kVerySharp = 2.4751;                 // cotangent of 22 degrees
 
 /// The triangles around a vertex.
 struct Star {
@@ -60,9 +62,65 @@ Vec3 bluntest_place(const Star& star, const Vec3& from, const Vec3& normal) {
     return best;
 }
 
+/// Marks the vertices of the triangles around v, which moved from there, and says what was done.
+Blunting moved(BluntedMesh& mesh, const Star& star, const std::vector<Triangle>& around, int v,
+               const Vec3& from) {
+    for (const Triangle& t : around)
+        for (const int w : t) mesh.touched[w] = 1;
+    return {star.triangle, around, v, from};
+}
+
+std::vector<Triangle> triangles_of(const Star& star, const BluntedMesh& mesh) {
+    std::vector<Triangle> result;
+    for (const int t : star.triangle) result.push_back(mesh.triangles[t]);
+    return result;
+}
+
+/// For what nothing cheaper helps: a pattern search in space over the places that the mesh may have, for each
+/// corner; the bluntest counts.
+std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
+    auto& points = mesh.points;
+    int vertex = -1;
+    Vec3 place;
+    double bluntest = std::numeric_limits<double>::infinity();
+    for (const int v : mesh.triangles[triangle]) {
+        if (!mesh.movable[v] || mesh.touched[v]) continue;
+        const Star star(v, mesh);
+        const std::vector<Triangle> around = triangles_of(star, mesh);
+        const Replaced before = mesh.replaced(around);
+        const Vec3 from = points[v];
+        Vec3 best = from;
+        double least = star.sharpness_at(from);
+        const double enough = kBluntGain * least;
+        for (double step = kFirstStep; step >= kLastStep;) {
+            const Vec3 centre = best;
+            for (int x = -1; x <= 1; ++x)
+                for (int y = -1; y <= 1; ++y)
+                    for (int z = -1; z <= 1; ++z) {
+                        points[v] = to_float_precision(centre + step * star.mean_edge * Vec3(x, y, z));
+                        const double s = star.sharpness_at(points[v]);
+                        if (!(s < least) || !mesh.may_have(around, before)) continue;
+                        least = s;
+                        best = points[v];
+                    }
+            if (best == centre) step *= 0.5;
+        }
+        points[v] = from;
+        if (!(least < enough) || !(least < bluntest)) continue;
+        bluntest = least;
+        vertex = v;
+        place = best;
+    }
+    if (vertex < 0) return std::nullopt;
+    const Star star(vertex, mesh);
+    const Vec3 from = points[vertex];
+    points[vertex] = place;
+    return moved(mesh, star, triangles_of(star, mesh), vertex, from);
+}
+
 }  // namespace
 
-std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle) {
+std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness) {
     auto& points = mesh.points;
     struct Move {
         int vertex;
@@ -84,9 +142,8 @@ std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle) {
     for (const auto& [v, star, goal, before, after] : moves) {
         const Vec3 from = points[v];
         const double height = mesh.probe.value(from);
-        std::vector<Triangle> around;
-        for (const int t : star.triangle) around.push_back(mesh.triangles[t]);
-        const double facing = mesh.facing(around);
+        const std::vector<Triangle> around = triangles_of(star, mesh);
+        const Replaced replaced = mesh.replaced(around);
         Vec3 way = goal - from;
         for (int halving = 0; halving <= kHalvings; ++halving, way *= 0.5) {
             const auto on_surface = mesh.probe.project(from + way);
@@ -94,15 +151,11 @@ std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle) {
             const Vec3 to = to_float_precision(*on_surface + height * mesh.probe.normal(*on_surface));
             if (!(star.sharpness_at(to) < kBluntGain * before)) continue;
             points[v] = to;
-            if (mesh.may_have(around, facing)) {
-                for (const Triangle& t : around)
-                    for (const int w : t) mesh.touched[w] = 1;
-                return Blunting{star.triangle, around, v, from};
-            }
+            if (mesh.may_have(around, replaced)) return moved(mesh, star, around, v, from);
             points[v] = from;
         }
     }
-    return std::nullopt;
+    return sharpness > kVerySharp ? search(mesh, triangle) : std::nullopt;
 }
 
 }  // namespace isotrack

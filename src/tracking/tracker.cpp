@@ -192,7 +192,7 @@ struct Work {
             if (vertex[p] >= 0) movable[vertex[p]] = 0;  // copies stay where they are
             vertex[p] = v;
         }
-        Blunter blunter(mesh.vertices, mesh.carved.triangles, std::move(movable), surface,
+        Blunter blunter(mesh.vertices, mesh.carved.triangles, std::move(movable), surface, *crossings,
                         kBluntShare * limits.tolerance);
         const auto missed = [&] {
             std::vector<std::array<double, 3>> places;

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "isotrack/surface/surface.h"
+#include "isotrack/surface/crossing_grid.h"
 #include "isotrack/types.h"
 
 namespace isotrack {
@@ -22,14 +22,15 @@ class Blunter {
 public:
     /// All but `movable` (one entry per point) must outlive it; nobody else may change the mesh meanwhile.
     Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
-            const Surface& surface, double tolerance);
+            const Surface& surface, const CrossingGrid& crossings, double tolerance);
 
     /// Looks at the triangles with an angle below 30 degrees, sharpest first, but for those that were looked
     /// at in vain and have not changed since; so often, or until nothing changes. Flips the longest edge, or
     /// moves a corner that is movable along the surface, its height above it kept, where the smallest angle
     /// of the triangles concerned grows by a tenth or more, all of them face the way the surface does, or no
-    /// worse than before, are within `tolerance` of it, and cross no other triangle. Points that move keep no
-    /// more digits than floats. Returns whether anything changed.
+    /// worse than before, are within `tolerance` of it, stay within it of the crossings they stood for, or as
+    /// near as they were, and cross no other triangle. Below 22 degrees corners may leave the surface, too.
+    /// Points that move keep no more digits than floats. Returns whether anything changed.
     bool run(int passes);
 
     /// Takes back the changes of which a triangle's box is within `distance` of one of these places, and what
@@ -49,6 +50,7 @@ private:
     std::vector<Triangle>& triangles_;
     std::vector<char> movable_;
     const Surface& surface_;
+    const CrossingGrid& crossings_;
     double tolerance_;
     std::vector<char> open_;       // per vertex: triangles around it are to be looked at
     std::vector<char> unchecked_;  // per triangle: changed since crossings were looked for
