@@ -14,7 +14,6 @@ namespace {
 constexpr double kSharp = 1.7320508075688772;  // cotangent of 30 degrees
 constexpr double kFacing = 0.5;                // cosine to the surface normal, at least
 constexpr double kOwn = 1.03;                  // of the tolerance: crossings that near are of a triangle
-constexpr int kSteps = 6;                      // barycentric lattice of the error samples
 
 Box box_of(const std::vector<Vec3>& points, const Triangle& t) {
     Box box(points[t[0]]);
@@ -107,13 +106,12 @@ bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>
 
 bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replaced& before) const {
     if (!(facing(candidates) > std::min(kFacing, before.facing))) return false;
-    return std::all_of(candidates.begin(), candidates.end(),
-                       [&](const Triangle& t) {
-                           return triangle_error(points[t[0]], points[t[1]], points[t[2]], probe, kSteps,
-                                                 0.5 * tolerance)
-                                      .largest <= tolerance;
-                       }) &&
-           reach_what(before, candidates);
+    const auto is_near = [&](const Triangle& t) {
+        const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+        return triangle_error(a, b, c, probe, error_steps(a, b, c, resolution), 0.5 * tolerance).largest <=
+               tolerance;
+    };
+    return std::all_of(candidates.begin(), candidates.end(), is_near) && reach_what(before, candidates);
 }
 
 Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
@@ -128,12 +126,14 @@ Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, st
       unchecked_(triangles.size(), 0) {}
 
 bool Blunter::run(int passes) {
-    const std::size_t before = changes_.size();
-    for (int p = 0; p < passes && pass(); ++p) {
+    bool any = false;
+    for (int p = 0; p < passes; ++p) {
+        const bool changed = pass();
+        any = any || changed;
+        // What crosses is found when all is done, and something else is tried instead.
+        if ((!changed || p + 1 == passes) && !undo_crossing()) break;
     }
-    if (changes_.size() == before) return false;
-    undo_crossing();
-    return true;
+    return any;
 }
 
 bool Blunter::pass() {
@@ -149,8 +149,9 @@ bool Blunter::pass() {
     std::sort(sharp.begin(), sharp.end());
     const std::size_t before = changes_.size();
     const auto probe = surface_.probe();
-    BluntedMesh mesh{points_, triangles_, Corners(points_.size(), triangles_), movable_, tolerance_,
-                     *probe,  crossings_, std::vector<char>(points_.size(), 0)};
+    BluntedMesh mesh{points_,  triangles_, Corners(points_.size(), triangles_),
+                     movable_, tolerance_, surface_.resolution(),
+                     *probe,   crossings_, std::vector<char>(points_.size(), 0)};
     for (const auto& [sharpest, t] : sharp) {
         for (const int v : triangles_[t])
             if (mesh.touched[v]) open_[v] = 1;
@@ -209,15 +210,15 @@ void Blunter::undo(const std::vector<char>& marked) {
     compact(changes_, taken);
 }
 
-void Blunter::undo_crossing() {
-    for (;;) {
+bool Blunter::undo_crossing() {
+    for (bool any = false;; any = true) {
         const std::vector<char> crossing = crossing_triangles(points_, triangles_, unchecked_);
         unchecked_.assign(triangles_.size(), 0);
         std::vector<char> marked;
         for (const Blunting& change : changes_)
             marked.push_back(std::any_of(change.triangle.begin(), change.triangle.end(),
                                          [&](int t) { return crossing[t]; }));
-        if (std::find(marked.begin(), marked.end(), 1) == marked.end()) return;
+        if (std::find(marked.begin(), marked.end(), 1) == marked.end()) return any;
         undo(marked);
     }
 }

@@ -24,6 +24,7 @@ struct BluntedMesh {
     const Corners corners;  ///< Of the start; still right around what is untouched.
     const std::vector<char>& movable;
     double tolerance;
+    double resolution;  ///< Of the surface.
     Surface::Probe& probe;
     const CrossingGrid& crossings;
     std::vector<char> touched;  ///< Per vertex: a change is near.

@@ -42,22 +42,24 @@ double squared_distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3&
     return (ap - (vb / sum) * ab - (vc / sum) * ac).squaredNorm();
 }
 
-/// Follows the error uphill from a lattice point, by ever smaller steps in the triangle's barycentric
-/// coordinates.
-void climb(Surface::Probe& probe, const Vec3& a, const Vec3& ab, const Vec3& ac, double step, double& u,
-           double& v, double& largest) {
+/// A place in a triangle, by barycentric coordinates, and how far it is from the surface.
+struct Sample {
+    double u = 0.0, v = 0.0, distance = 0.0;
+};
+
+/// Follows the distance to one side of the surface (`sign`) uphill from a lattice point, by ever smaller
+/// steps.
+void climb(Surface::Probe& probe, const Vec3& a, const Vec3& ab, const Vec3& ac, double step, double sign,
+           Sample& best) {
     constexpr int kHalvings = 3;
     constexpr int kDirections[6][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}};
     for (int halving = 0; halving < kHalvings; ++halving, step *= 0.5) {
-        const double from_u = u, from_v = v;
+        const Sample from = best;
         for (const auto& d : kDirections) {
-            const double next_u = from_u + step * d[0], next_v = from_v + step * d[1];
-            if (next_u < 0.0 || next_v < 0.0 || next_u + next_v > 1.0) continue;
-            const double value = std::abs(probe.value(a + next_u * ab + next_v * ac));
-            if (value <= largest) continue;
-            largest = value;
-            u = next_u;
-            v = next_v;
+            const double u = from.u + step * d[0], v = from.v + step * d[1];
+            if (u < 0.0 || v < 0.0 || u + v > 1.0) continue;
+            const double distance = sign * probe.value(a + u * ab + v * ac);
+            if (distance > best.distance) best = {u, v, distance};
         }
     }
 }
@@ -68,23 +70,29 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
                              double refine_above) {
     TriangleError error;
     int count = 0;
-    double best_u = 0.0, best_v = 0.0;
+    Sample outside, inside;  // the farthest on either side
     for (int i = 0; i <= steps; ++i)
         for (int j = 0; i + j <= steps; ++j) {
             const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
-            const double value = std::abs(probe.value(a + u * (b - a) + v * (c - a)));
+            const double value = probe.value(a + u * (b - a) + v * (c - a));
             error.mean_square += value * value;
             ++count;
-            if (value <= error.largest) continue;
-            error.largest = value;
-            best_u = u;
-            best_v = v;
+            if (value > outside.distance) outside = {u, v, value};
+            if (-value > inside.distance) inside = {u, v, -value};
         }
-    if (error.largest > refine_above)
-        climb(probe, a, b - a, c - a, 0.5 / steps, best_u, best_v, error.largest);
-    error.where = a + best_u * (b - a) + best_v * (c - a);
+    if (outside.distance > refine_above) climb(probe, a, b - a, c - a, 0.5 / steps, 1.0, outside);
+    if (inside.distance > refine_above) climb(probe, a, b - a, c - a, 0.5 / steps, -1.0, inside);
+    const Sample& farthest = outside.distance > inside.distance ? outside : inside;
+    error.largest = farthest.distance;
+    error.where = a + farthest.u * (b - a) + farthest.v * (c - a);
     error.mean_square /= count;
     return error;
+}
+
+int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution) {
+    constexpr int kFew = 3, kMany = 6;  // multiples of 3 hold the centroid
+    const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+    return longest2 <= kFew * resolution * kFew * resolution ? kFew : kMany;
 }
 
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
@@ -95,8 +103,11 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
         Surface::Probe& probe = probes.local();
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
-            const auto& [i, j, k] = triangles[t];
-            errors[t] = triangle_error(points[i], points[j], points[k], probe, steps, refine_above);
+            const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
+                       &c = points[triangles[t][2]];
+            errors[t] = triangle_error(
+                a, b, c, probe, steps == kStepsByLength ? error_steps(a, b, c, surface.resolution()) : steps,
+                refine_above);
         }
     });
     return errors;

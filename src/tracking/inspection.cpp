@@ -13,7 +13,6 @@
 namespace isotrack {
 namespace {
 
-constexpr int kSteps = 6;  // barycentric lattice of the error samples; multiples of 3 hold the centroid
 constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's largest error is searched for
 constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
 constexpr double kLostAt = 3.0;      // tolerances
@@ -69,8 +68,8 @@ std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector
 
 void Inspector::expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles) {
     expected_.emplace(particles.size(), triangles);
-    expected_errors_ =
-        triangle_errors(particles, expected_->triangles(), surface_, kSteps, kSuspect * limits_.tolerance);
+    expected_errors_ = triangle_errors(particles, expected_->triangles(), surface_, kStepsByLength,
+                                       kSuspect * limits_.tolerance);
 }
 
 std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
@@ -92,7 +91,8 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     std::vector<Triangle> fresh;
     for (std::size_t f = 0; f < facets.size(); ++f)
         if (!known[f]) fresh.push_back(from_least_corner(mesh.carved.triangles[f]));
-    const auto errors = triangle_errors(mesh.vertices, fresh, surface_, kSteps, kSuspect * limits_.tolerance);
+    const auto errors =
+        triangle_errors(mesh.vertices, fresh, surface_, kStepsByLength, kSuspect * limits_.tolerance);
     auto next = errors.begin();
     std::vector<Vec3> in_vain;
     const auto probe = surface_.probe();

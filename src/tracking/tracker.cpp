@@ -60,7 +60,7 @@ constexpr double kMostPerCrossing = 0.5;
 constexpr std::size_t kMostAnyway = 1000;
 constexpr int kFitSteps = 6;
 constexpr double kFitWideExponent = 0.5;
-constexpr int kBluntRounds = 3, kBluntPasses = 4;
+constexpr int kBluntRounds = 3, kBluntPasses = 12;
 constexpr double kBluntShare = 0.96;    // of the tolerance, for the triangles they change
 constexpr double kAngleFloor = 2.0;     // details: sharp edges are as round as they make them
 constexpr double kLeastSpacing = 5e-4;  // resolutions: a single node inside may leave no more than that
@@ -214,9 +214,12 @@ struct Work {
                     places.emplace_back(p[0], p[1], p[2]);
             return places;
         };
-        for (int round = 0; round < kBluntRounds && blunter.run(kBluntPasses); ++round)
+        bool again = true;
+        for (int round = 0; again && round < kBluntRounds && blunter.run(kBluntPasses); ++round) {
+            again = false;
             for (auto places = newly_missed(); !places.empty(); places = newly_missed())
-                if (!blunter.undo_near(places, limits.tolerance)) break;
+                again = blunter.undo_near(places, limits.tolerance);
+        }
     }
 
     TrackedFrame finish(Method method) {

@@ -44,7 +44,7 @@ public:
 private:
     bool pass();
     void undo(const std::vector<char>& marked);
-    void undo_crossing();
+    bool undo_crossing();  // whether there was any
 
     std::vector<Vec3>& points_;
     std::vector<Triangle>& triangles_;

@@ -19,12 +19,18 @@ struct TriangleError {
 };
 
 /// The error of triangle abc at the points of a regular barycentric lattice with `steps` intervals per edge
-/// (>= 1): (steps+1)(steps+2)/2 points. Where the largest of them is above `refine_above` the error is
-/// followed uphill between the points; the mean is that of the points.
+/// (>= 1): (steps+1)(steps+2)/2 points. Where it is above `refine_above` on a side of the surface it is
+/// followed uphill between the points, to within about a percent; the mean is that of the points.
 TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
                              double refine_above = std::numeric_limits<double>::infinity());
 
-/// That of each triangle. Uses TBB inside; the result does not depend on the number of threads.
+/// The intervals per edge that show the error of triangle abc: 6, or 3 where its longest edge is at most
+/// three resolutions of the surface.
+int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution);
+constexpr int kStepsByLength = 0;
+
+/// That of each triangle; `steps` may be kStepsByLength: what `error_steps` says. Uses TBB inside; the result
+/// does not depend on the number of threads.
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps,
