@@ -51,9 +51,9 @@ struct Sample {
 /// steps.
 void climb(Surface::Probe& probe, const Vec3& a, const Vec3& ab, const Vec3& ac, double step, double sign,
            Sample& best) {
-    constexpr int kHalvings = 3;
+    constexpr double kLeastStep = 0.02;
     constexpr int kDirections[6][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}};
-    for (int halving = 0; halving < kHalvings; ++halving, step *= 0.5) {
+    for (; step >= kLeastStep; step *= 0.5) {
         const Sample from = best;
         for (const auto& d : kDirections) {
             const double u = from.u + step * d[0], v = from.v + step * d[1];

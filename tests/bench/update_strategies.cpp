@@ -8,7 +8,7 @@
 // every largest ball touches the surface along a whole circle, so the DT has flat cells between four
 // particles of a circle, which turn over at the smallest move: most moves then break the embedding, and at
 // two points of four each lazy cannot put off more than every second of those.
-// "sweeps" is what the tracker does: sweeps over all particles at once, the DT built anew after every third.
+// "sweeps" is what the tracker does: sweeps over all particles at once, the DT built anew after every sixth.
 // Energy: mean over the particles of sum exp(-r^2 / sigma^2) with sigma = d / sqrt(2), d the spacing of a
 // hexagonal packing of as many particles on that area. Second table: time to settle over that of rebuild.
 #include <fmt/format.h>
@@ -142,7 +142,7 @@ void spread(std::size_t count, const Vec3& half_axes) {
 
     // As far as lazy came, by what the tracker does.
     constexpr double kAlike = 1.01;
-    constexpr int kMostRounds = 100, kSweepsPerRound = 3;
+    constexpr int kMostRounds = 100, kSweepsPerRound = 6;
     Particles particles = start;
     const auto dt = make_tetrahedralisation(UpdateStrategy::Auto);
     double seconds = 0.0;

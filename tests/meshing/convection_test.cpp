@@ -396,6 +396,27 @@ TEST(TriangleErrors, FollowTheErrorBetweenThePointsWhenItMatters) {
     }
 }
 
+TEST(TriangleErrors, FollowTheErrorOnBothSidesOfTheSurface) {
+    // Corners on either side, so that the farthest sample is often not where the error is largest.
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const auto probe = sphere->probe();
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    for (int trial = 0; trial < 2000; ++trial) {
+        const Vec3 middle = Vec3(unit(random), unit(random), unit(random)).normalized();
+        Vec3 corner[3];
+        for (Vec3& c : corner) {
+            c = (middle + 0.15 * Vec3(unit(random), unit(random), unit(random))).normalized();
+            c *= 1.0 + 0.01 * unit(random);
+        }
+        const auto& [a, b, c] = corner;
+        const int steps = error_steps(a, b, c, sphere->resolution());
+        const double found = triangle_error(a, b, c, *probe, steps, 0.0).largest,
+                     truth = triangle_error(a, b, c, *probe, 60).largest;
+        EXPECT_NEAR(found, truth, 0.02 * truth);
+    }
+}
+
 TEST(CrossingDistances, AreExactUpToTheCutoffAndInfiniteBeyond) {
     // A mesh of the left sphere alone: the crossings of the right one are far away.
     const auto surface =
