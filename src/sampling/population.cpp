@@ -162,7 +162,7 @@ std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages
         if (there < 0 || surrounded[there]) continue;
         surrounded[there] = 1;
         const double h = kShrink * std::min(wanted, particles.spacing[there]);
-        if (h < min_spacing) continue;
+        if (h < std::max(min_spacing, s.least)) continue;
         particles.spacing[there] = h;
         const Vec3 p = particles.position[there], a = particles.normal[there].unitOrthogonal(),
                    b = particles.normal[there].cross(a);

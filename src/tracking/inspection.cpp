@@ -18,6 +18,7 @@ constexpr double kCertified = 0.98;  // of the tolerance: so that samples at oth
 constexpr double kLostAt = 3.0;      // tolerances
 constexpr double kFaultReach = 1.5;  // resolutions
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
+constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
 constexpr double kLargestCotangent = 2.4751, kLargestFittedCotangent = 3.0777;  // of 22 and 18 degrees
 constexpr double kSmooth =
     0.45;  // cosine between the normals of a triangle's corners, for its angles to matter
@@ -224,7 +225,8 @@ void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspectio
     std::sort(found.begin(), found.end());
     found.erase(std::unique(found.begin(), found.end()), found.end());
     for (const auto& p : found)
-        inspection.doubtful.push_back({Vec3(p[0], p[1], p[2]), spacing * surface_.resolution()});
+        inspection.doubtful.push_back({Vec3(p[0], p[1], p[2]), spacing * surface_.resolution(),
+                                       kLeastDoubtful * surface_.resolution()});
 }
 
 void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {

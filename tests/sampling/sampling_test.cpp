@@ -472,6 +472,9 @@ TEST(Densify, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
     }
     EXPECT_LT(0.6 * ring, 0.05);
     EXPECT_GE(ring, 0.05);
+    particles.spacing[0] = 0.4;
+    EXPECT_EQ(densify(particles, {{{0, 0, 1}, 0.4, 0.3}}, *sphere, 0.05, kMany, next_id), 0u);
+    EXPECT_DOUBLE_EQ(particles.spacing[0], 0.4);
     for (std::size_t i = 0; i < particles.size(); ++i)
         for (std::size_t j = 0; j < i; ++j)
             EXPECT_GE((particles.position[i] - particles.position[j]).norm(), 0.7 * 0.05);

@@ -33,14 +33,15 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
 /// A place where the mesh fails, and the spacing that would mend it.
 struct Shortage {
     Vec3 place;
-    double spacing;  ///< World units.
+    double spacing;      ///< World units.
+    double least = 0.0;  ///< Particles around it get no denser than this.
 };
 
 /// Adds particles at the projections of `shortages`, in their order, at least 0.7 of their spacing from
 /// particles that face the same way. A particle that is nearer is surrounded instead: its spacing becomes 0.6
-/// of the smaller of its own and the wanted one, down to `min_spacing`, and six more are added around it at
-/// that distance, so that repeated calls get denser. There will be no more than `most` particles. Returns how
-/// many were added: 0 means that nothing more can be done.
+/// of the smaller of its own and the wanted one, down to `min_spacing` and `least`, and six more are added
+/// around it at that distance, so that repeated calls get denser. There will be no more than `most`
+/// particles. Returns how many were added: 0 means that nothing more can be done.
 std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface,
                     double min_spacing, std::size_t most, Id& next_id);
 
