@@ -2,8 +2,10 @@
 //
 //     isotrack_scale write folder --voxel 0.004 --frames 4
 //     isotrack_scale track folder --tolerance 0.002 --measure 2
+//     isotrack_scale files folder --tolerance 0.002
 //
-// The surface is a sphere with bumps that travel around it while it drifts, the same at any voxel size.
+// The surface is a sphere with bumps that travel around it while it drifts, the same at any voxel size, or
+// one without bumps.
 #include <fmt/format.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/VolumeToMesh.h>
@@ -31,6 +33,7 @@
 #include "isotrack/surface/level_set.h"
 #include "isotrack/surface/rasterise.h"
 #include "isotrack/surface/shapes.h"
+#include "isotrack/tracking/mesh_sequence.h"
 #include "isotrack/tracking/tracker.h"
 
 namespace isotrack::bench {
@@ -39,11 +42,13 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kRadius = 0.35, kHeight = 0.01, kWavelength = 0.1;
+constexpr double kRadius = 0.35, kBumps = 0.01, kWavelength = 0.1;
 
-shapes::SurfacePtr bumpy_sphere(int frame, double voxel) {
+/// With bumps of this height.
+shapes::SurfacePtr sphere(double height, int frame, double voxel) {
     constexpr double kDrift = 0.002, kTravel = 0.0025;  // per frame
-    constexpr double k = 2.0 * kPi / kWavelength, kSteepest = 1.0 + k * kHeight;
+    constexpr double k = 2.0 * kPi / kWavelength;
+    const double steepest = 1.0 + k * height;
     // Within so many voxels the value is the distance to first order but where the slope is low, beyond them
     // never more than the distance: no block of the band may seem to be farther than its diagonal.
     constexpr double kNear = 5.0, kLowSlope = 0.6;
@@ -52,12 +57,12 @@ shapes::SurfacePtr bumpy_sphere(int frame, double voxel) {
     const auto value = [=](const Vec3& p) {
         const Vec3 way = p - centre;
         const Eigen::Array3d at = k * way + phase, s = at.sin(), c = at.cos();
-        const double length = way.norm(), f = length - kRadius - kHeight * s.prod();
-        if (!(std::abs(f) < kNear * voxel)) return f / kSteepest;
+        const double length = way.norm(), f = length - kRadius - height * s.prod();
+        if (!(std::abs(f) < kNear * voxel)) return f / steepest;
         const Vec3 waves(c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]);
-        return f / std::max(kLowSlope, (way / length - k * kHeight * waves).norm());
+        return f / std::max(kLowSlope, (way / length - k * height * waves).norm());
     };
-    const Vec3 reach = Vec3::Constant(kRadius + kHeight);
+    const Vec3 reach = Vec3::Constant(kRadius + height);
     return shapes::from_function(value, Box(centre - reach, centre + reach), voxel);
 }
 
@@ -65,15 +70,17 @@ struct WriteArguments {
     std::string folder;
     double voxel = 0.0, per_diagonal = 0.0;
     int frames = 4;
+    bool perfect = false;
 };
 
 int write(const WriteArguments& arguments) {
+    const double height = arguments.perfect ? 0.0 : kBumps;
     const double voxel = arguments.per_diagonal > 0.0
-                             ? bumpy_sphere(0, 1.0)->bounds().diagonal().norm() / arguments.per_diagonal
+                             ? sphere(height, 0, 1.0)->bounds().diagonal().norm() / arguments.per_diagonal
                              : arguments.voxel;
     std::filesystem::create_directories(arguments.folder);
     for (int frame = 0; frame < arguments.frames; ++frame) {
-        const openvdb::FloatGrid::Ptr grid = rasterise(*bumpy_sphere(frame, voxel), voxel);
+        const openvdb::FloatGrid::Ptr grid = rasterise(*sphere(height, frame, voxel), voxel);
         grid->setName("surface");
         openvdb::io::File(fmt::format("{}/frame.{:04}.vdb", arguments.folder, frame)).write({grid});
     }
@@ -166,6 +173,41 @@ int track(const TrackArguments& arguments) {
     return 0;
 }
 
+struct FilesArguments {
+    std::string input;
+    double tolerance = 0.0;
+};
+
+/// From files to files. One row: the seconds of all together, and of each of the stages that run beside each
+/// other.
+int files(const FilesArguments& arguments) {
+    const InputSequence input = find_frames({arguments.input});
+    const auto folder = std::filesystem::path(arguments.input) / "meshes";
+    std::filesystem::create_directories(folder);
+    MeshSequenceOptions options;
+    options.tolerance = {arguments.tolerance, false};
+    options.on_existing = OnExisting::Overwrite;
+    RunReport report;
+    Json row;
+    row["all"] =
+        seconds_of([&] { report = mesh_sequence(input, (folder / "mesh.####.ply").string(), options); });
+    double particles = 0.0, read = 0.0, track = 0.0, finish = 0.0;
+    for (const FrameReport& frame : report.frames) {
+        particles = static_cast<double>(frame.particles);
+        for (const auto& [stage, seconds] : frame.seconds) {
+            if (stage == "total") continue;
+            (stage == "read" ? read : stage == "blunt" || stage == "write" ? finish : track) += seconds;
+        }
+    }
+    row["frames"] = report.frames.size();
+    row["particles"] = particles;
+    row["reading"] = read;
+    row["tracking"] = track;
+    row["finishing"] = finish;
+    fmt::print("{}", cli::format_table(Json::array({row}), cli::TableFormat::Csv));
+    return exit_code(report);
+}
+
 }  // namespace
 }  // namespace isotrack::bench
 
@@ -183,6 +225,7 @@ int main(int argc, char** argv) {
     size->add_option("--per-diagonal", to_write.per_diagonal, "Voxels per diagonal of the shape")
         ->check(CLI::PositiveNumber);
     write_command->add_option("--frames", to_write.frames)->check(CLI::PositiveNumber)->capture_default_str();
+    write_command->add_flag("--perfect", to_write.perfect, "No bumps");
     write_command->callback([&] { result = write(to_write); });
 
     TrackArguments to_track;
@@ -197,6 +240,14 @@ int main(int argc, char** argv) {
     track_command->add_option("--threads", to_track.threads, "0: one per core")->capture_default_str();
     track_command->add_flag("--peers", to_track.peers, "OpenVDB's volumeToMesh on the same grids, too");
     track_command->callback([&] { result = track(to_track); });
+
+    FilesArguments of_files;
+    auto* files_command = app.add_subcommand("files", "Mesh a folder of frames, print a row of CSV");
+    files_command->add_option("folder", of_files.input)->required()->check(CLI::ExistingDirectory);
+    files_command->add_option("--tolerance", of_files.tolerance, "World units")
+        ->required()
+        ->check(CLI::PositiveNumber);
+    files_command->callback([&] { result = files(of_files); });
 
     try {
         openvdb::initialize();
