@@ -114,11 +114,39 @@ bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replac
     return std::all_of(candidates.begin(), candidates.end(), is_near) && reach_what(before, candidates);
 }
 
+std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& except) const {
+    std::vector<Triangle> result;
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        if (box.intersects(box_of(points, triangles[t])) &&
+            !std::binary_search(except.begin(), except.end(), static_cast<int>(t)))
+            result.push_back(triangles[t]);
+    return result;
+}
+
+bool BluntedMesh::crosses(const std::vector<Triangle>& candidates,
+                          const std::vector<Triangle>& others) const {
+    TriangleMesh mesh;
+    mesh.triangles = candidates;
+    mesh.triangles.insert(mesh.triangles.end(), others.begin(), others.end());
+    std::vector<int> used;
+    for (const Triangle& t : mesh.triangles) used.insert(used.end(), t.begin(), t.end());
+    std::sort(used.begin(), used.end());
+    used.erase(std::unique(used.begin(), used.end()), used.end());
+    for (const int v : used) mesh.points.push_back(points[v]);
+    for (Triangle& t : mesh.triangles)
+        for (int& v : t) v = static_cast<int>(std::lower_bound(used.begin(), used.end(), v) - used.begin());
+    const auto pairs = self_intersections(mesh);
+    return std::any_of(pairs.begin(), pairs.end(), [&](const auto& pair) {
+        return static_cast<std::size_t>(std::min(pair.first, pair.second)) < candidates.size();
+    });
+}
+
 Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
                  const Surface& surface, const CrossingGrid& crossings, double tolerance)
     : points_(points),
       triangles_(triangles),
       movable_(std::move(movable)),
+      fixed_(points.size(), 0),
       surface_(surface),
       crossings_(crossings),
       tolerance_(tolerance),
@@ -126,12 +154,13 @@ Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, st
       unchecked_(triangles.size(), 0) {}
 
 bool Blunter::run(int passes) {
+    constexpr int kBetweenChecks = 4;  // for crossings: what crosses is taken back, and something else tried
     bool any = false;
-    for (int p = 0; p < passes; ++p) {
+    for (int p = 1; p <= passes; ++p) {
         const bool changed = pass();
         any = any || changed;
-        // What crosses is found when all is done, and something else is tried instead.
-        if ((!changed || p + 1 == passes) && !undo_crossing()) break;
+        if (changed && p < passes && p % kBetweenChecks != 0) continue;
+        if (!undo_crossing() && !changed) break;
     }
     return any;
 }
@@ -149,9 +178,16 @@ bool Blunter::pass() {
     std::sort(sharp.begin(), sharp.end());
     const std::size_t before = changes_.size();
     const auto probe = surface_.probe();
-    BluntedMesh mesh{points_,  triangles_, Corners(points_.size(), triangles_),
-                     movable_, tolerance_, surface_.resolution(),
-                     *probe,   crossings_, std::vector<char>(points_.size(), 0)};
+    BluntedMesh mesh{points_,
+                     triangles_,
+                     Corners(points_.size(), triangles_),
+                     movable_,
+                     fixed_,
+                     tolerance_,
+                     surface_.resolution(),
+                     *probe,
+                     crossings_,
+                     std::vector<char>(points_.size(), 0)};
     for (const auto& [sharpest, t] : sharp) {
         for (const int v : triangles_[t])
             if (mesh.touched[v]) open_[v] = 1;
@@ -204,7 +240,7 @@ void Blunter::undo(const std::vector<char>& marked) {
             for (const int v : t) open_[v] = 1;
         if (change.vertex < 0) continue;
         points_[change.vertex] = change.from;
-        if (marked[c]) movable_[change.vertex] = 0;
+        if (marked[c]) fixed_[change.vertex] = 1;
     }
     for (char& flag : taken) flag = !flag;
     compact(changes_, taken);

@@ -23,6 +23,7 @@ struct BluntedMesh {
     std::vector<Triangle>& triangles;
     const Corners corners;  ///< Of the start; still right around what is untouched.
     const std::vector<char>& movable;
+    const std::vector<char>& fixed;  ///< Per vertex: a move of it was taken back.
     double tolerance;
     double resolution;  ///< Of the surface.
     Surface::Probe& probe;
@@ -34,6 +35,10 @@ struct BluntedMesh {
     /// Whether all these triangles face the way the surface does, or no worse than those they stand for, are
     /// within the tolerance of it, and keep what those stand for of the crossings within the tolerance.
     bool may_have(const std::vector<Triangle>& candidates, const Replaced& before) const;
+    /// The triangles but `except` (ascending) whose boxes meet this one.
+    std::vector<Triangle> near(const Box& box, const std::vector<int>& except) const;
+    /// Whether some of these triangles cross each other or some of the others.
+    bool crosses(const std::vector<Triangle>& candidates, const std::vector<Triangle>& others) const;
 
 private:
     double facing(const std::vector<Triangle>& some) const;

@@ -16,7 +16,7 @@ namespace {
 constexpr int kWays = 8;                              // that are tried from each place
 constexpr double kFirstStep = 0.3, kLastStep = 0.02;  // of the mean edge
 constexpr int kHalvings = 2;                          // of a move that leaves the tolerance
-constexpr double kVerySharp = 2.4751;                 // cotangent of 22 degrees
+constexpr double kVerySharp = 3.0777;                 // cotangent of 18 degrees
 
 /// The triangles around a vertex.
 struct Star {
@@ -88,22 +88,31 @@ std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
         const Star star(v, mesh);
         const std::vector<Triangle> around = triangles_of(star, mesh);
         const Replaced before = mesh.replaced(around);
-        const Vec3 from = points[v];
+        const Vec3 from = points[v], reach = Vec3::Constant(star.mean_edge);
+        const std::vector<Triangle> others =
+            mesh.near(Box(before.box.min() - reach, before.box.max() + reach), star.triangle);
         Vec3 best = from;
         double least = star.sharpness_at(from);
         const double enough = kBluntGain * least;
         for (double step = kFirstStep; step >= kLastStep;) {
-            const Vec3 centre = best;
+            std::vector<std::pair<double, Vec3>> blunter;
             for (int x = -1; x <= 1; ++x)
                 for (int y = -1; y <= 1; ++y)
                     for (int z = -1; z <= 1; ++z) {
-                        points[v] = to_float_precision(centre + step * star.mean_edge * Vec3(x, y, z));
-                        const double s = star.sharpness_at(points[v]);
-                        if (!(s < least) || !mesh.may_have(around, before)) continue;
-                        least = s;
-                        best = points[v];
+                        const Vec3 there = to_float_precision(best + step * star.mean_edge * Vec3(x, y, z));
+                        if (const double s = star.sharpness_at(there); s < least)
+                            blunter.emplace_back(s, there);
                     }
-            if (best == centre) step *= 0.5;
+            std::sort(blunter.begin(), blunter.end(),
+                      [](const auto& p, const auto& q) { return p.first < q.first; });
+            const auto found = std::find_if(blunter.begin(), blunter.end(), [&](const auto& candidate) {
+                points[v] = candidate.second;
+                return mesh.may_have(around, before) && !mesh.crosses(around, others);
+            });
+            if (found == blunter.end())
+                step *= 0.5;
+            else
+                std::tie(least, best) = *found;
         }
         points[v] = from;
         if (!(least < enough) || !(least < bluntest)) continue;
@@ -130,7 +139,7 @@ std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness)
     };
     std::vector<Move> moves;
     for (const int v : mesh.triangles[triangle]) {
-        if (!mesh.movable[v] || mesh.touched[v]) continue;
+        if (!mesh.movable[v] || mesh.fixed[v] || mesh.touched[v]) continue;
         Star star(v, mesh);
         const Vec3 normal = mesh.probe.normal(points[v]);
         if (normal == Vec3::Zero()) continue;

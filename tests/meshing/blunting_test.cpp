@@ -86,7 +86,7 @@ TEST_F(RoughSphere, GetsBlunterTrianglesAndStaysSound) {
     for (const Blunting& change : blunter.changes()) ++(change.vertex < 0 ? flips : moves);
     EXPECT_GT(flips, 0u);
     EXPECT_GT(moves, 0u);
-    std::size_t left_surface = 0;  // for triangles below 22 degrees
+    std::size_t left_surface = 0;  // for triangles below 18 degrees
     for (std::size_t v = 0; v < after.points.size(); ++v) {
         if (after.points[v] == before.points[v]) continue;
         EXPECT_NEAR(after.points[v].norm(), 1.0, kTolerance);

@@ -29,13 +29,13 @@ public:
     /// moves a corner that is movable along the surface, its height above it kept, where the smallest angle
     /// of the triangles concerned grows by a tenth or more, all of them face the way the surface does, or no
     /// worse than before, are within `tolerance` of it, stay within it of the crossings they stood for, or as
-    /// near as they were, and cross no other triangle. Below 22 degrees corners may leave the surface, too.
+    /// near as they were, and cross no other triangle. Below 18 degrees corners may leave the surface, too.
     /// Points that move keep no more digits than floats. Returns whether anything changed.
     bool run(int passes);
 
     /// Takes back the changes of which a triangle's box is within `distance` of one of these places, and what
-    /// was changed upon them; all, if there is none. Their vertices are not movable any more. Returns whether
-    /// there was anything to take back.
+    /// was changed upon them; all, if there is none. Their vertices only move for what is very sharp from
+    /// then on. Returns whether there was anything to take back.
     bool undo_near(const std::vector<Vec3>& places, double distance);
 
     /// All that was changed and not taken back.
@@ -48,7 +48,7 @@ private:
 
     std::vector<Vec3>& points_;
     std::vector<Triangle>& triangles_;
-    std::vector<char> movable_;
+    std::vector<char> movable_, fixed_;  // fixed: a move was taken back
     const Surface& surface_;
     const CrossingGrid& crossings_;
     double tolerance_;
