@@ -35,7 +35,7 @@ namespace isotrack {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr int kColdRounds = 4, kWarmRounds = 2;
+constexpr int kColdRounds = 3, kWarmRounds = 2;
 constexpr int kMendingSweeps = 3;
 constexpr int kMostMendings = 3;
 constexpr double kFew = 0.01;  // of the particles: few enough to be added by certify, without relaxation
@@ -45,7 +45,7 @@ struct Pace {
     double thinning;
     int sweeps;
 };
-constexpr Pace kAtFirst{{}, 0.3, 6};
+constexpr Pace kAtFirst{{}, 0.3, 7};
 constexpr Pace kFollowing{{0.6, 0.85}, 0.6, 3};  // ids live longer, and so does what certify added last
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr double kDetail = 2.0;       // tolerances
