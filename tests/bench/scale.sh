@@ -120,9 +120,14 @@ for size in $sizes; do
             printf "| %d | %d | %.2f | %.2f | %d | %d |\n", value["particles"], value["voxels"], tolerance, value["advance"],
                    value["particles"] / value["advance"], 1048576 * value["above_mb"] / value["particles"]
             miss(value["not_kept"] > 0, sprintf("%d particles: tolerance not kept", value["particles"]))
+            rate = value["particles"] / value["advance"]
+            miss(rate < 60000, sprintf("%d particles: %d per second", value["particles"], rate))
+            bytes = 1048576 * value["above_mb"] / value["particles"]
+            miss(bytes > 1500, sprintf("%d particles: %d bytes each", value["particles"], bytes))
         }'
 done
 echo
+echo "Wanted: 60 000 particles per second, at most 1500 bytes each."
 print_missed
 
 # A body whose DT is the hardest for the exact predicates, beside the one with bumps, of about as many particles.
@@ -130,9 +135,9 @@ echo
 echo "| surface | particles | seconds, without read | microseconds per particle | of these the DT |"
 echo "|---|---:|---:|---:|---:|"
 sphere_row() {
-    evaluate -v name="$1" '
+    evaluate -v surface="$1" '
         END {
-            printf "| %s | %d | %.2f | %.1f | %.1f |\n", name, value["particles"], value["advance"],
+            printf "| %s | %d | %.2f | %.1f | %.1f |\n", surface, value["particles"], value["advance"],
                    1e6 * value["advance"] / value["particles"], 1e6 * value["delaunay"] / value["particles"]
         }'
 }
@@ -140,7 +145,7 @@ size_for 16000
 track --tolerance "$tolerance"
 sphere_row "sphere with bumps"
 write --voxel "$voxel" --perfect
-track --tolerance "$(calculate "$tolerance / 7")"
+track --tolerance "$(calculate "$tolerance / 8.4")"
 sphere_row "perfect sphere"
 
 echo
