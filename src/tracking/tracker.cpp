@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <unordered_set>
@@ -326,10 +327,21 @@ struct Tracker::Impl {
     }
 
     /// Brings the DT to the particles. `moved`: what was known of its cells does not hold any more.
-    void tetrahedralise(bool moved, std::map<std::string, double>& seconds) {
-        const StageTimer timer(seconds, "delaunay");
+    /// `meanwhile` runs beside it, which keeps one thread alone busy, and may read the particles.
+    void tetrahedralise(bool moved, std::map<std::string, double>& seconds,
+                        const std::function<void()>& meanwhile = {}) {
         round_to_float(particles);
-        if (moved) labels.clear();
+        tbb::task_group beside;
+        if (meanwhile) beside.run(meanwhile);
+        {
+            const StageTimer timer(seconds, "delaunay");
+            if (moved) labels.clear();
+            bring_dt(moved);
+        }
+        const StageTimer timer(seconds, "certify");
+        beside.wait();
+    }
+    void bring_dt(bool moved) {
         if (in_dt.empty()) {
             dt->assign(particles.position);
         } else {
@@ -590,15 +602,10 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     std::size_t added = 0;
     for (int mending = 0;; ++mending) {
         inspector.emplace(surface, l, *work->crossings);
-        round_to_float(particles);
-        tbb::task_group beside;  // the DT, which keeps one thread alone busy
+        std::function<void()> measure_expected;
         if (!options.fit && options.method != Method::Paper)
-            beside.run([&] { inspector->expect(particles.position, memory.triangles); });
-        tetrahedralise(true, seconds);
-        {
-            const StageTimer timer(seconds, "certify");
-            beside.wait();
-        }
+            measure_expected = [&] { inspector->expect(particles.position, memory.triangles); };
+        tetrahedralise(true, seconds, measure_expected);
         fitted = {};
         make_mesh();
         const StageTimer timer(seconds, "certify");

@@ -27,10 +27,10 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
 /// The intervals per edge that show the error of triangle abc: 6, or 3 where its longest edge is at most
 /// three resolutions of the surface.
 int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution);
-constexpr int kStepsByLength = 0;
+constexpr int kStepsByLength = 0;  ///< Instead of a number: what `error_steps` says.
 
-/// That of each triangle; `steps` may be kStepsByLength: what `error_steps` says. Uses TBB inside; the result
-/// does not depend on the number of threads.
+/// That of each triangle; `steps` may be kStepsByLength. Uses TBB inside; the result does not depend on the
+/// number of threads.
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps,
