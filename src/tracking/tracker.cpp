@@ -16,10 +16,8 @@
 #include "isotrack/error.h"
 #include "isotrack/meshing/blunting.h"
 #include "isotrack/meshing/convection.h"
-#include "isotrack/meshing/fit.h"
 #include "isotrack/meshing/manifold.h"
 #include "isotrack/meshing/open_border.h"
-#include "isotrack/meshing/self_intersections.h"
 #include "isotrack/meshing/untangle.h"
 #include "isotrack/sampling/coordinate_descent.h"
 #include "isotrack/sampling/cover.h"
@@ -30,6 +28,7 @@
 #include "sampling/compact.h"
 #include "surface/float_precision.h"
 #include "surface/thread_probes.h"
+#include "tracking/fitted.h"
 #include "tracking/inspection.h"
 
 namespace isotrack {
@@ -59,7 +58,6 @@ constexpr int kCertifyRounds = 24;
 // that; one with holes in its band would take more than it has lattice edges.
 constexpr double kMostPerCrossing = 0.5;
 constexpr std::size_t kMostAnyway = 1000;
-constexpr int kFitSteps = 6;
 constexpr double kFitWideExponent = 0.5;
 constexpr int kBluntRounds = 3, kBluntPasses = 12;
 constexpr double kBluntShare = 0.96;    // of the tolerance, for the triangles they change
@@ -137,18 +135,6 @@ struct Memory {
         ring = ring.extended(parents, count);
         evidence.error.resize(count, -1.0);
         evidence.thickness.resize(count, std::numeric_limits<double>::infinity());
-    }
-};
-
-/// Where the vertices of a mesh were fitted to.
-struct Fitted {
-    std::vector<Facet> facets;   // before the fit
-    std::vector<Vec3> position;  // per particle
-
-    void take(const FrameMesh& mesh, std::size_t particles) {
-        position.resize(particles);
-        for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-            if (const int p = mesh.carved.particle[v]; p >= 0) position[p] = mesh.vertices[v];
     }
 };
 
@@ -387,68 +373,6 @@ struct Tracker::Impl {
         return mesh;
     }
 
-    /// Fits anew what is within two rings of where the mesh differs from the one fitted before, `fitted`.
-    void fit_vertices(FrameMesh& mesh, Fitted& fitted, const Surface& surface,
-                      std::map<std::string, double>& seconds) {
-        const StageTimer timer(seconds, "fit");
-        const auto& triangles = mesh.carved.triangles;
-        std::vector<Facet> facets = facets_of(mesh.carved, mesh.on_surface);
-        std::vector<char> movable(mesh.vertices.size(), 0);
-        compare(
-            facets, fitted.facets, [](std::size_t, std::size_t) {},
-            [&](std::size_t f) {
-                for (const int v : triangles[f]) movable[v] = 1;
-            },
-            [](std::size_t) {});
-        std::vector<int> copies(particles.size(), 0);  // of which only one place is known
-        for (const int p : mesh.carved.particle)
-            if (p >= 0) ++copies[p];
-        for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-            const int p = mesh.carved.particle[v];
-            if (p < 0 || copies[p] > 1) movable[v] = 1;
-            if (!movable[v]) mesh.vertices[v] = fitted.position[p];
-        }
-        constexpr int kRings = 2;
-        for (int ring = 0; ring < kRings; ++ring) {
-            const std::vector<char> before = movable;
-            for (const Triangle& t : triangles)
-                if (before[t[0]] || before[t[1]] || before[t[2]])
-                    for (const int v : t) movable[v] = 1;
-        }
-        fit(mesh.vertices, triangles, surface, kFitSteps, movable);
-        for (Vec3& v : mesh.vertices) v = to_float_precision(v);
-        fitted.facets = std::move(facets);
-        fitted.take(mesh, particles.size());
-    }
-
-    /// Puts fitted vertices back where their triangles cross others, a ring further each time, until none
-    /// cross. Facets of a DT do not. Returns whether any did.
-    static bool undo_crossing_fits(FrameMesh& b) {
-        TriangleMesh mesh;
-        mesh.triangles = b.carved.triangles;
-        std::vector<char> undo(b.vertices.size(), 0);
-        for (bool any = true; any;) {
-            mesh.points = b.vertices;
-            any = false;
-            const auto back = [&](int v) {
-                undo[v] = 1;
-                any = any || b.vertices[v] != b.on_surface[v];
-            };
-            for (const auto& pair : self_intersections(mesh))
-                for (const int t : {pair.first, pair.second})
-                    for (const int v : mesh.triangles[t]) back(v);
-            if (!any && std::count(undo.begin(), undo.end(), 1) == 0) break;
-            for (std::size_t v = 0; v < undo.size(); ++v)
-                if (undo[v]) b.vertices[v] = b.on_surface[v];
-            if (!any) break;
-            const std::vector<char> ring = undo;
-            for (const Triangle& t : mesh.triangles)
-                if (ring[t[0]] || ring[t[1]] || ring[t[2]])
-                    for (const int v : t) undo[v] = 1;
-        }
-        return std::find(undo.begin(), undo.end(), 1) != undo.end();
-    }
-
     /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
     std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, std::size_t crossings,
                      const Surface& surface, const SizingLimits& l) {
@@ -498,8 +422,10 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool w
     for (int round = 0; round < rounds; ++round) {
         tetrahedralise(true, seconds);
         FrameMesh mesh = carve_mesh(surface, seconds);
-        Fitted none;
-        if (options.fit) fit_vertices(mesh, none, surface, seconds);
+        if (options.fit) {
+            const StageTimer timer(seconds, "fit");
+            Fitted().fit_vertices(mesh, particles.size(), surface);
+        }
         {
             const StageTimer timer(seconds, "size");
             memory.evidence.error = errors_at_particles(
@@ -595,7 +521,9 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     Fitted fitted;
     const auto make_mesh = [&] {
         mesh = carve_mesh(surface, seconds);
-        if (options.fit) fit_vertices(mesh, fitted, surface, seconds);
+        if (!options.fit) return;
+        const StageTimer timer(seconds, "fit");
+        fitted.fit_vertices(mesh, particles.size(), surface);
     };
     const std::size_t crossing_count = work->crossings->crossings().size();
     // As long as many particles have to be added their surroundings make room for them.
@@ -629,8 +557,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         const auto passes = [&] { return last || mend(mesh, inspection, crossing_count, surface, l) == 0; };
         inspection = inspector->inspect_both_ways(mesh);
         bool good = passes();
-        if (good && options.fit && undo_crossing_fits(mesh)) {
-            fitted.take(mesh, particles.size());
+        if (good && options.fit && fitted.undo_crossing(mesh, particles.size())) {
             inspection = inspector->inspect_both_ways(mesh);
             good = passes();
         }
