@@ -17,6 +17,7 @@ constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's 
 constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
 constexpr double kLostAt = 3.0;      // tolerances
 constexpr double kFaultReach = 1.5;  // resolutions
+constexpr double kMissedSpacing = 0.75;  // resolutions: near enough to be that part of the surface
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
 constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
 constexpr double kLargestCotangent = 2.4751, kLargestFittedCotangent = 3.0777;  // of 22 and 18 degrees
@@ -282,7 +283,8 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             result.push_back({inspection.errors[t].where, 0.7 * h});
         }
     }
-    for (const auto& c : inspection.missed) result.push_back({c.point, 2.0 * surface.resolution()});
+    for (const auto& c : inspection.missed)
+        result.push_back({c.point, kMissedSpacing * surface.resolution()});
     result.insert(result.end(), inspection.doubtful.begin(), inspection.doubtful.end());
     for (const auto& e : carved.complex_edges)
         result.push_back({0.5 * (particles.position[e.from] + particles.position[e.to]),
