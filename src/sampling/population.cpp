@@ -6,8 +6,8 @@
 #include <numeric>
 #include <utility>
 
-#include "isotrack/sampling/particle_grid.h"
 #include "sampling/metric.h"
+#include "surface/float_precision.h"
 
 namespace isotrack {
 
@@ -123,56 +123,62 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
     return parents;
 }
 
-std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface,
-                    double min_spacing, std::size_t most, Id& next_id) {
-    constexpr double kApart = 0.7, kShrink = 0.6;
+Densifier::Densifier(Particles& particles, const Surface& surface, double min_spacing, std::size_t most,
+                     Id& next_id)
+    : particles_(particles),
+      surface_(surface),
+      min_spacing_(min_spacing),
+      most_(most),
+      next_id_(next_id),
+      probe_(surface.probe()),
+      grid_(2.0 * surface.resolution()) {}
+
+std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
+    constexpr double kShrink = 0.6;
     constexpr int kAround = 6;
     constexpr double kGoldenAngle = 2.399963;
-    if (shortages.empty() || particles.size() >= most) return 0;
-    PointGrid grid(2.0 * surface.resolution());
-    for (std::size_t i = 0; i < particles.size(); ++i)
-        grid.insert(particles.position[i], static_cast<int>(i));
-    const std::size_t before = particles.size();
-    std::vector<char> surrounded(particles.size(), 0);
-    const auto probe = surface.probe();
-    /// Adds a particle at the projection of `place`, at most `h` apart from the others, or returns the one
-    /// that is already there.
-    const auto add = [&](const Vec3& place, double h) {
-        int nearest = -1;
-        if (particles.size() >= most) return nearest;
-        const auto p = probe->project(place);
-        if (!p) return nearest;
-        const Vec3 n = probe->normal(*p);
-        double least = kApart * h * kApart * h;
-        grid.for_each_within(*p, kApart * h, [&](int i, double d2) {
-            if (d2 > least || !(particles.normal[i].dot(n) > 0.0)) return;
-            least = d2;
-            nearest = i;
-        });
-        const double apart = std::sqrt(least);
-        if (nearest >= 0 && apart < kApart * particles.spacing[nearest]) return nearest;
-        grid.insert(*p, static_cast<int>(particles.size()));
-        particles.add(*p, n, std::max(apart / kApart, min_spacing), next_id++);
-        surrounded.push_back(1);
-        return -1;
-    };
+    const std::size_t before = particles_.size();
+    if (shortages.empty() || before >= most_) return 0;
+    for (; in_grid_ < before; ++in_grid_)
+        grid_.insert(particles_.position[in_grid_], static_cast<int>(in_grid_));
+    std::vector<char> surrounded(before, 0);
     for (const Shortage& s : shortages) {
-        const double wanted = std::max(s.spacing, min_spacing);
+        const double wanted = std::max(s.spacing, min_spacing_);
         const int there = add(s.place, wanted);
-        if (there < 0 || surrounded[there]) continue;
+        if (there < 0 || static_cast<std::size_t>(there) >= before || surrounded[there]) continue;
         surrounded[there] = 1;
-        const double h = kShrink * std::min(wanted, particles.spacing[there]);
-        if (h < std::max(min_spacing, s.least)) continue;
-        particles.spacing[there] = h;
-        const Vec3 p = particles.position[there], a = particles.normal[there].unitOrthogonal(),
-                   b = particles.normal[there].cross(a);
-        const double turn = kGoldenAngle * static_cast<double>(particles.size());  // rings do not line up
+        const double h = kShrink * std::min(wanted, particles_.spacing[there]);
+        if (h < std::max(min_spacing_, s.least)) continue;
+        particles_.spacing[there] = h;
+        const Vec3 p = particles_.position[there], a = particles_.normal[there].unitOrthogonal(),
+                   b = particles_.normal[there].cross(a);
+        const double turn = kGoldenAngle * static_cast<double>(particles_.size());  // rings do not line up
         for (int k = 0; k < kAround; ++k) {
             const double angle = turn + 2.0 * kPi * k / kAround;
             add(p + h * (std::cos(angle) * a + std::sin(angle) * b), h);
         }
     }
-    return particles.size() - before;
+    return particles_.size() - before;
+}
+
+int Densifier::add(const Vec3& place, double h) {
+    constexpr double kApart = 0.7;
+    int nearest = -1;
+    if (particles_.size() >= most_) return nearest;
+    const auto projected = probe_->project(place);
+    if (!projected) return nearest;
+    const Vec3 p = to_float_precision(*projected), n = probe_->normal(p);
+    double least = kApart * h * kApart * h;
+    grid_.for_each_within(p, kApart * h, [&](int i, double d2) {
+        if (d2 > least || !(particles_.normal[i].dot(n) > 0.0)) return;
+        least = d2;
+        nearest = i;
+    });
+    const double apart = std::sqrt(least);
+    if (nearest >= 0 && apart < kApart * particles_.spacing[nearest]) return nearest;
+    grid_.insert(p, static_cast<int>(in_grid_++));
+    particles_.add(p, n, std::max(apart / kApart, min_spacing_), next_id_++);
+    return -1;
 }
 
 }  // namespace isotrack

@@ -6,24 +6,19 @@
 #include <array>
 #include <cmath>
 
-#include "meshing/sharpness.h"
 #include "sampling/compact.h"
 #include "surface/lattice_scan.h"
+#include "tracking/failing.h"
 
 namespace isotrack {
 namespace {
 
-constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's largest error is searched for
-constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
-constexpr double kLostAt = 3.0;      // tolerances
-constexpr double kFaultReach = 1.5;  // resolutions
+constexpr double kLostAt = 3.0;          // tolerances
+constexpr double kFaultReach = 1.5;      // resolutions
 constexpr double kMissedSpacing = 0.75;  // resolutions: near enough to be that part of the surface
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
 constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
-constexpr double kLargestCotangent = 2.4751, kLargestFittedCotangent = 3.0777;  // of 22 and 18 degrees
-constexpr double kSmooth =
-    0.45;  // cosine between the normals of a triangle's corners, for its angles to matter
-constexpr double kAnglesFrom = 1.0;  // resolutions: longest edge of such a triangle
+constexpr double kLargestFittedCotangent = 3.0777;  // of 18 degrees
 
 struct Corners {
     Triangle particle;
@@ -39,21 +34,13 @@ Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
     return result;
 }
 
-/// On smooth surface, not tiny, and with too small an angle, before the fit or after it.
+/// After the fit, too.
 bool is_needle(const FrameMesh& mesh, const Particles& particles, std::size_t triangle,
                const Triangle& corner, double resolution) {
     const auto& [i, j, k] = mesh.carved.triangles[triangle];
-    const auto& at = particles.position;
-    if (!(sharpness(at[corner[0]], at[corner[1]], at[corner[2]]) > kLargestCotangent) &&
-        !(sharpness(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]) > kLargestFittedCotangent))
-        return false;
-    double longest = 0.0;
-    for (int e = 0; e < 3; ++e) {
-        const int a = corner[e], b = corner[(e + 1) % 3];
-        if (!(particles.normal[a].dot(particles.normal[b]) > kSmooth)) return false;
-        longest = std::max(longest, (at[a] - at[b]).norm());
-    }
-    return longest > kAnglesFrom * resolution;
+    return is_needle(particles, corner, resolution) ||
+           (sharpness(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]) > kLargestFittedCotangent &&
+            angles_matter(particles, corner, resolution));
 }
 
 }  // namespace

@@ -30,6 +30,7 @@
 #include "surface/thread_probes.h"
 #include "tracking/fitted.h"
 #include "tracking/inspection.h"
+#include "tracking/refinement.h"
 
 namespace isotrack {
 namespace {
@@ -373,15 +374,18 @@ struct Tracker::Impl {
         return mesh;
     }
 
-    /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
-    std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, std::size_t crossings,
-                     const Surface& surface, const SizingLimits& l) {
+    Densifier densifier(const Surface& surface, const SizingLimits& l, std::size_t crossings) {
         const double finer = std::max(1.0, 0.5 * surface.resolution() / l.tolerance);
         const auto most =
             kMostAnyway + static_cast<std::size_t>(kMostPerCrossing * finer * static_cast<double>(crossings));
         const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
-        return densify(particles, shortages(mesh, inspection, dt->cells(), particles, surface, l), surface,
-                       least, most, next_id);
+        return {particles, surface, least, most, next_id};
+    }
+
+    /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
+    std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, const Surface& surface,
+                     const SizingLimits& l, Densifier& densifier) {
+        return densifier.add(shortages(mesh, inspection, dt->cells(), particles, surface, l));
     }
 
     /// The newborn move like the neighbours that were there before; alone among newborn they rest.
@@ -540,21 +544,31 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         if (options.method == Method::Paper) break;
         inspection = mending == 0 ? inspector->inspect(mesh) : inspector->inspect_both_ways(mesh);
         memory.evidence.error = errors_at_particles(mesh, inspection.errors, particles.size());
-        added = mend(mesh, inspection, crossing_count, surface, l);
+        Densifier once = densifier(surface, l, crossing_count);
+        added = mend(mesh, inspection, surface, l, once);
         if (mending == kMostMendings ||
             static_cast<double>(added) < kFew * static_cast<double>(particles.size()))
             break;
         make_room(surface, frame);
     }
+    // A fitted mesh fails elsewhere than its particles do.
+    const bool refines = !options.fit && options.method == Method::Tolerance &&
+                         options.reconstruction == Reconstruction::Guided;
     // The topology, which takes longer to look at, is looked at when all else passes.
+    Densifier densifier = this->densifier(surface, l, crossing_count);
     for (int round = 0;; ++round) {
         if (round > 0 || added > 0) {
             tetrahedralise(false, seconds);
+            if (refines) {
+                const StageTimer timer(seconds, "certify");
+                refine(*dt, labels, particles, densifier, surface, l);
+                in_dt = particles.id;
+            }
             make_mesh();
         }
         const StageTimer timer(seconds, "certify");
         const bool last = options.method == Method::Paper || round == kCertifyRounds;
-        const auto passes = [&] { return last || mend(mesh, inspection, crossing_count, surface, l) == 0; };
+        const auto passes = [&] { return last || mend(mesh, inspection, surface, l, densifier) == 0; };
         inspection = inspector->inspect_both_ways(mesh);
         bool good = passes();
         if (good && options.fit && fitted.undo_crossing(mesh, particles.size())) {

@@ -433,35 +433,40 @@ TEST(Adjacency, RingSquareGapsAndNewborn) {
     EXPECT_TRUE(list(more, 7).empty());
 }
 
-TEST(Densify, StopsAtTheMostThatMayBe) {
+TEST(Densifier, StopsAtTheMostThatMayBe) {
     const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
     Particles particles;
     particles.add({0, 0, 1}, {0, 0, 1}, 0.4, 0);
     Id next_id = 1;
     const std::vector<Shortage> places = {{{0, 0, 1}, 0.4}, {{1, 0, 0}, 0.4}, {{0, 1, 0}, 0.4}};
-    EXPECT_EQ(densify(particles, places, *sphere, 0.05, 1, next_id), 0u);
-    EXPECT_EQ(densify(particles, places, *sphere, 0.05, 5, next_id), 4u);
+    EXPECT_EQ(Densifier(particles, *sphere, 0.05, 1, next_id).add(places), 0u);
+    Densifier five(particles, *sphere, 0.05, 5, next_id);
+    EXPECT_EQ(five.add(places), 4u);
     EXPECT_EQ(particles.size(), 5u);
-    EXPECT_EQ(densify(particles, places, *sphere, 0.05, 5, next_id), 0u);
+    EXPECT_EQ(five.add(places), 0u);
 }
 
-TEST(Densify, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
+TEST(Densifier, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
     const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
     Particles particles;
     particles.add({0, 0, 1}, {0, 0, 1}, 0.4, 0);
     Id next_id = 1;
-    constexpr std::size_t kMany = 1000;
-    EXPECT_EQ(densify(particles, {}, *sphere, 0.05, kMany, next_id), 0u);
-    EXPECT_EQ(densify(particles, {{{1.1, 0, 0}, 0.4}}, *sphere, 0.05, kMany, next_id), 1u);
+    Densifier densifier(particles, *sphere, 0.05, 1000, next_id);
+    EXPECT_EQ(densifier.add({}), 0u);
+    EXPECT_EQ(densifier.add({{{1.1, 0, 0}, 0.4}}), 1u);
     ASSERT_EQ(particles.size(), 2u);
     EXPECT_NEAR((particles.position[1] - Vec3(1, 0, 0)).norm(), 0.0, 1e-4);
+    EXPECT_EQ(particles.position[1], Vec3(particles.position[1].cast<float>().cast<double>()));
     EXPECT_EQ(particles.id[1], 1);
+    // Others may add particles, too.
+    particles.add({0, 1, 0}, {0, 1, 0}, 0.4, next_id++);
+    EXPECT_EQ(densifier.add({{{0, 1.1, 0}, 0.4, 0.3}}), 0u);
     // On the very place of the first: a ring of six around it, nearer at each call, down to the smallest
     // spacing.
     double ring = 0.4;
     for (int calls = 0; calls < 20; ++calls) {
         const std::size_t before = particles.size();
-        const std::size_t added = densify(particles, {{{0, 0, 1}, 0.4}}, *sphere, 0.05, kMany, next_id);
+        const std::size_t added = densifier.add({{{0, 0, 1}, 0.4}});
         EXPECT_EQ(particles.size(), before + added);
         if (added == 0) break;
         ring *= 0.6;
@@ -473,7 +478,7 @@ TEST(Densify, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
     EXPECT_LT(0.6 * ring, 0.05);
     EXPECT_GE(ring, 0.05);
     particles.spacing[0] = 0.4;
-    EXPECT_EQ(densify(particles, {{{0, 0, 1}, 0.4, 0.3}}, *sphere, 0.05, kMany, next_id), 0u);
+    EXPECT_EQ(densifier.add({{{0, 0, 1}, 0.4, 0.3}}), 0u);
     EXPECT_DOUBLE_EQ(particles.spacing[0], 0.4);
     for (std::size_t i = 0; i < particles.size(); ++i)
         for (std::size_t j = 0; j < i; ++j)

@@ -1,9 +1,11 @@
 // Births and deaths, with a dead zone between them so that the population does not flicker.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "isotrack/sampling/adjacency.h"
+#include "isotrack/sampling/particle_grid.h"
 #include "isotrack/sampling/particles.h"
 #include "isotrack/surface/surface.h"
 
@@ -37,12 +39,33 @@ struct Shortage {
     double least = 0.0;  ///< Particles around it get no denser than this.
 };
 
-/// Adds particles at the projections of `shortages`, in their order, at least 0.7 of their spacing from
-/// particles that face the same way. A particle that is nearer is surrounded instead: its spacing becomes 0.6
-/// of the smaller of its own and the wanted one, down to `min_spacing` and `least`, and six more are added
-/// around it at that distance, so that repeated calls get denser. There will be no more than `most`
-/// particles. Returns how many were added: 0 means that nothing more can be done.
-std::size_t densify(Particles& particles, const std::vector<Shortage>& shortages, const Surface& surface,
-                    double min_spacing, std::size_t most, Id& next_id);
+/// Adds particles where the mesh fails, call by call. Between calls the particles may only be added to.
+class Densifier {
+public:
+    /// There will be no more than `most` particles. All references must outlive it.
+    Densifier(Particles& particles, const Surface& surface, double min_spacing, std::size_t most,
+              Id& next_id);
+
+    /// Adds particles at the projections of `shortages`, in their order, at least 0.7 of their spacing from
+    /// particles that face the same way, at places that floats can hold. A particle that is nearer is
+    /// surrounded instead: its spacing becomes 0.6 of the smaller of its own and the wanted one, down to
+    /// `min_spacing` and `least`, and six more are added around it at that distance, so that repeated calls
+    /// get denser. Returns how many were added: 0 means that nothing more can be done.
+    std::size_t add(const std::vector<Shortage>& shortages);
+
+private:
+    /// Adds a particle at the projection of `place`, at most `h` apart from the others, or returns the one
+    /// that is already there.
+    int add(const Vec3& place, double h);
+
+    Particles& particles_;
+    const Surface& surface_;
+    double min_spacing_;
+    std::size_t most_;
+    Id& next_id_;
+    std::unique_ptr<Surface::Probe> probe_;
+    PointGrid grid_;
+    std::size_t in_grid_ = 0;
+};
 
 }  // namespace isotrack

@@ -1,0 +1,35 @@
+// What a triangle of a mesh must not be.
+#pragma once
+
+#include <algorithm>
+
+#include "isotrack/sampling/particles.h"
+#include "meshing/sharpness.h"
+
+namespace isotrack {
+
+constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's largest error is searched for
+constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
+
+/// Whether the angles of a triangle between particles matter: on smooth surface, and not tiny.
+inline bool angles_matter(const Particles& particles, const Triangle& corner, double resolution) {
+    constexpr double kSmooth = 0.45;     // cosine between the normals of the corners
+    constexpr double kAnglesFrom = 1.0;  // resolutions: longest edge
+    double longest = 0.0;
+    for (int e = 0; e < 3; ++e) {
+        const int a = corner[e], b = corner[(e + 1) % 3];
+        if (!(particles.normal[a].dot(particles.normal[b]) > kSmooth)) return false;
+        longest = std::max(longest, (particles.position[a] - particles.position[b]).norm());
+    }
+    return longest > kAnglesFrom * resolution;
+}
+
+/// Whether its particles make it too sharp, where that matters.
+inline bool is_needle(const Particles& particles, const Triangle& corner, double resolution) {
+    constexpr double kLargestCotangent = 2.4751;  // of 22 degrees
+    const auto& at = particles.position;
+    return sharpness(at[corner[0]], at[corner[1]], at[corner[2]]) > kLargestCotangent &&
+           angles_matter(particles, corner, resolution);
+}
+
+}  // namespace isotrack
