@@ -93,13 +93,23 @@ struct LivingDelaunay::Impl {
         changed.push_back(s);
     }
 
+    /// Cells are the most of what a DT holds: twice the room for a few more would be too much.
+    void add_slot() {
+        constexpr std::size_t kSlack = 16;  // of as many
+        if (flat.size() == flat.vertices.capacity()) {
+            flat.vertices.reserve(flat.size() + flat.size() / kSlack + kSlack);
+            flat.neighbours.reserve(flat.vertices.capacity());
+        }
+        flat.vertices.emplace_back();
+        flat.neighbours.emplace_back();
+    }
+
     /// Gives every cell in `fresh` a slot and writes it and its neighbours.
     void adopt() {
         for (const Cell& cell : fresh) {
             if (free_slots.empty()) {
                 cell->info().index = static_cast<int>(flat.size());
-                flat.vertices.emplace_back();
-                flat.neighbours.emplace_back();
+                add_slot();
             } else {
                 cell->info().index = free_slots.back();
                 free_slots.pop_back();

@@ -86,7 +86,7 @@ bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>
     bool all = true;
     crossings.for_each_in(Box(before.box.min() - reach, before.box.max() + reach), [&](std::size_t c) {
         if (!all) return;
-        const Surface::Crossing& crossing = crossings.crossings()[c];
+        const Surface::Crossing crossing = crossings[c];
         double least = own2;
         bool own = false;
         for (const FacingTriangle& t : before.triangles) {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <numeric>
 
 #include "delaunay/circumcentre.h"
 #include "surface/thread_probes.h"
@@ -182,18 +183,15 @@ double FacingTriangle::squared_distance(const Surface::Crossing& crossing, doubl
 }
 
 void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                        const CrossingGrid& grid, double cutoff, std::vector<double>& distances) {
-    const std::vector<Surface::Crossing>& crossings = grid.crossings();
-    std::vector<std::size_t> unknown;
-    for (std::size_t i = 0; i < crossings.size(); ++i)
-        if (distances[i] == kUnknownDistance) unknown.push_back(i);
-    if (unknown.empty()) return;
-    std::vector<char> wanted(crossings.size(), 0);
-    const std::unique_ptr<std::size_t[]> number(new std::size_t[crossings.size()]);  // of the unknown ones
-    std::vector<LeastSquare> least(unknown.size());
-    for (std::size_t u = 0; u < unknown.size(); ++u) {
-        wanted[unknown[u]] = 1;
-        number[unknown[u]] = u;
+                        const CrossingGrid& grid, const std::vector<std::size_t>& some, double cutoff,
+                        std::vector<double>& distances) {
+    if (some.empty()) return;
+    std::vector<char> wanted(grid.size(), 0);
+    const std::unique_ptr<std::size_t[]> number(new std::size_t[grid.size()]);  // of those among `some`
+    std::vector<LeastSquare> least(some.size());
+    for (std::size_t u = 0; u < some.size(); ++u) {
+        wanted[some[u]] = 1;
+        number[some[u]] = u;
     }
     const auto for_each_block = [](std::size_t count, const auto& body) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 64), [&](const auto& range) {
@@ -206,7 +204,7 @@ void crossing_distances(const std::vector<Vec3>& points, const std::vector<Trian
                    (a.cwiseMax(b).cwiseMax(c).array() + reach).matrix());
     };
     // Most triangles are far from all that is wanted when little is.
-    std::vector<char> columns = grid.columns_of(wanted);
+    std::vector<char> columns = grid.columns_of(some);
     std::vector<char> is_near(triangles.size());
     for_each_block(triangles.size(), [&](std::size_t t) {
         is_near[t] = grid.meets(box_around(triangles[t], cutoff), columns);
@@ -221,33 +219,35 @@ void crossing_distances(const std::vector<Vec3>& points, const std::vector<Trian
             const auto measure = [&](std::size_t c) {
                 if (!wanted[c]) return;
                 LeastSquare& found = least[number[c]];
-                found.take(triangle.squared_distance(crossings[c], std::min(reach * reach, found.get())));
+                found.take(triangle.squared_distance(grid[c], std::min(reach * reach, found.get())));
             };
             grid.for_each_in(box_around(near[t], reach), measure, &columns);
         });
-        bool any = false;
-        for (std::size_t u = 0; u < unknown.size(); ++u) {
-            wanted[unknown[u]] = least[u].get() > reach * reach;
-            any = any || wanted[unknown[u]];
+        std::vector<std::size_t> left;
+        for (const std::size_t c : some) {
+            wanted[c] = least[number[c]].get() > reach * reach;
+            if (wanted[c]) left.push_back(c);
         }
-        return any;
+        return left;
     };
     // Most are near.
     constexpr double kNear = 0.4;
-    if (search(kNear * cutoff)) {
-        columns = grid.columns_of(wanted);
+    if (const std::vector<std::size_t> left = search(kNear * cutoff); !left.empty()) {
+        columns = grid.columns_of(left);
         search(cutoff);
     }
-    for (std::size_t u = 0; u < unknown.size(); ++u)
-        distances[unknown[u]] =
-            wanted[unknown[u]] ? std::numeric_limits<double>::infinity() : std::sqrt(least[u].get());
+    for (const std::size_t c : some)
+        distances[c] =
+            wanted[c] ? std::numeric_limits<double>::infinity() : std::sqrt(least[number[c]].get());
 }
 
 std::vector<double> crossing_distances(const std::vector<Vec3>& points,
                                        const std::vector<Triangle>& triangles, const CrossingGrid& grid,
                                        double cutoff) {
-    std::vector<double> distances(grid.crossings().size(), kUnknownDistance);
-    crossing_distances(points, triangles, grid, cutoff, distances);
+    std::vector<double> distances(grid.size());
+    std::vector<std::size_t> all(grid.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    crossing_distances(points, triangles, grid, all, cutoff, distances);
     return distances;
 }
 

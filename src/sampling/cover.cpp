@@ -19,6 +19,7 @@ constexpr double kOffPlane =
 // A lattice edge along the surface, up to this cosine, counts to either side where it crosses at the particle
 // itself.
 constexpr double kGrazing = 0.01, kHere = 0.1;  // kHere: spacings of the crossings
+constexpr double kRounding = 1e-5;              // of a particle's normal
 constexpr double kLargestSeed = 5.0;  // spacings of the crossings: above it small features are stepped over
 
 /// A shuffled order that depends on the seed and the count alone [splitmix64].
@@ -33,19 +34,20 @@ std::uint64_t mix(std::uint64_t x) {
 
 std::size_t cover(Particles& particles, const Surface& surface, const CrossingGrid& grid,
                   const SizingLimits& limits, std::uint64_t seed, Id& next_id) {
-    const std::vector<Surface::Crossing>& crossings = grid.crossings();
-    if (crossings.empty()) return 0;
+    if (grid.empty()) return 0;
     const double spacing = grid.spacing();
-    std::vector<std::atomic<char>> covered(crossings.size());  // marked by several threads
+    std::vector<std::atomic<char>> covered(grid.size());  // marked by several threads
     const auto mark = [&](const Vec3& p, const Vec3& n, double reach,
                           const std::vector<char>* columns = nullptr) {
         reach = std::max(reach, 1.2 * spacing);  // a crossing lies within a cell's diagonal of its neighbours
         const double off_plane = std::max(kOffPlane * reach, 0.5 * spacing);
         const auto mark_one = [&](std::size_t c) {
-            const Vec3 way = crossings[c].point - p;
+            const Surface::Crossing crossing = grid[c];
+            const Vec3 way = crossing.point - p;
             if (way.squaredNorm() > reach * reach || std::abs(n.dot(way)) >= off_plane) return;
-            const double facing = n.dot(crossings[c].outward.cast<double>());
-            if (facing > 0.0 || (facing > -kGrazing && way.squaredNorm() < kHere * spacing * kHere * spacing))
+            const double facing = n.dot(crossing.outward.cast<double>());
+            if (facing > kRounding ||
+                (facing > -kGrazing && way.squaredNorm() < kHere * spacing * kHere * spacing))
                 covered[c].store(1, std::memory_order_relaxed);
         };
         grid.for_each_in(Box(p - Vec3::Constant(reach), p + Vec3::Constant(reach)), mark_one, columns);
@@ -58,14 +60,15 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     };
     if (particles.size() > 0) {
         mark_all(kNear, nullptr);
-        std::vector<char> open(crossings.size());
-        for (std::size_t c = 0; c < crossings.size(); ++c) open[c] = !covered[c];
+        std::vector<std::size_t> open;
+        for (std::size_t c = 0; c < grid.size(); ++c)
+            if (!covered[c]) open.push_back(c);
         const std::vector<char> columns = grid.columns_of(open);
         mark_all(kReach, &columns);
     }
 
     std::vector<int> order;
-    for (std::size_t c = 0; c < crossings.size(); ++c)
+    for (std::size_t c = 0; c < grid.size(); ++c)
         if (!covered[c]) order.push_back(static_cast<int>(c));
     std::sort(order.begin(), order.end(), [&](int a, int b) {
         const auto ka = mix(seed ^ mix(a)), kb = mix(seed ^ mix(b));
@@ -76,8 +79,9 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     for (const int c : order) {
         if (covered[c]) continue;
         covered[c] = 1;
-        const auto p = probe->project(crossings[c].point);
-        if (!p || (*p - crossings[c].point).norm() > 1.5 * surface.resolution()) continue;
+        const Vec3 start = grid[c].point;
+        const auto p = probe->project(start);
+        if (!p || (*p - start).norm() > 1.5 * surface.resolution()) continue;
         const Vec3 n = probe->normal(*p);
         if (!(n.squaredNorm() > 0.0)) continue;
         const double h = std::min(spacing_from_curvature(*probe, *p, n, spacing, limits),

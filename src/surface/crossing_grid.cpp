@@ -7,7 +7,7 @@
 
 namespace isotrack {
 
-CrossingGrid::CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
+CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing)
     : spacing_(spacing), width_(2.0 * spacing) {
     constexpr double kColumnsPerCrossing = 4.0;
     if (crossings.empty()) return;
@@ -20,31 +20,39 @@ CrossingGrid::CrossingGrid(std::vector<Surface::Crossing> crossings, double spac
     for (int axis = 0; axis < 2; ++axis) count_[axis] = static_cast<int>(size[axis] / width_) + 1;
 
     const std::size_t columns = static_cast<std::size_t>(count_[0]) * count_[1];
-    const auto column_of = [&](const Surface::Crossing& c) {
-        return static_cast<std::size_t>(column(0, c.point.x())) * count_[1] + column(1, c.point.y());
-    };
     first_.assign(columns + 1, 0);
-    for (const auto& c : crossings) ++first_[column_of(c) + 1];
+    const auto entry_of = [&](const Surface::Crossing& c) {
+        return Entry{(c.point - origin_).cast<float>(), direction_of(c.outward)};
+    };
+    for (const auto& c : crossings) ++first_[column_of(entry_of(c)) + 1];
     for (std::size_t c = 0; c < columns; ++c) first_[c + 1] += first_[c];
     std::vector<std::size_t> end(first_.begin(), first_.end() - 1);
-    crossings_.resize(crossings.size());
-    for (const auto& c : crossings) crossings_[end[column_of(c)]++] = c;
+    entries_.resize(crossings.size());
+    for (const auto& c : crossings) {
+        const Entry entry = entry_of(c);
+        entries_[end[column_of(entry)]++] = entry;
+    }
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns, 256), [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c)
-            std::sort(crossings_.begin() + static_cast<std::ptrdiff_t>(first_[c]),
-                      crossings_.begin() + static_cast<std::ptrdiff_t>(first_[c + 1]),
-                      [](const Surface::Crossing& a, const Surface::Crossing& b) {
-                          return std::tie(a.point.z(), a.point.x(), a.point.y()) <
-                                 std::tie(b.point.z(), b.point.x(), b.point.y());
+            std::sort(entries_.begin() + static_cast<std::ptrdiff_t>(first_[c]),
+                      entries_.begin() + static_cast<std::ptrdiff_t>(first_[c + 1]),
+                      [](const Entry& a, const Entry& b) {
+                          return std::make_tuple(a.offset.z(), a.offset.x(), a.offset.y()) <
+                                 std::make_tuple(b.offset.z(), b.offset.x(), b.offset.y());
                       });
     });
 }
 
-std::vector<char> CrossingGrid::columns_of(const std::vector<char>& wanted) const {
+std::uint32_t CrossingGrid::direction_of(const Eigen::Vector3f& outward) {
+    const auto known = std::find(directions_.begin(), directions_.end(), outward);
+    const auto number = static_cast<std::uint32_t>(known - directions_.begin());
+    if (known == directions_.end()) directions_.push_back(outward);
+    return number;
+}
+
+std::vector<char> CrossingGrid::columns_of(const std::vector<std::size_t>& some) const {
     std::vector<char> result(first_.empty() ? 0 : first_.size() - 1, 0);
-    for (std::size_t column = 0; column < result.size(); ++column)
-        for (std::size_t c = first_[column]; c < first_[column + 1] && !result[column]; ++c)
-            result[column] = wanted[c];
+    for (const std::size_t i : some) result[column_of(entries_[i])] = 1;
     return result;
 }
 

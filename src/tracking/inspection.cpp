@@ -13,9 +13,9 @@
 namespace isotrack {
 namespace {
 
-constexpr double kLostAt = 3.0;          // tolerances
-constexpr double kFaultReach = 1.5;      // resolutions
-constexpr double kMissedSpacing = 0.75;  // resolutions: near enough to be that part of the surface
+constexpr double kLostAt = 3.0;                            // tolerances
+constexpr double kFaultReach = 1.5;                        // resolutions
+constexpr double kMissedSpacing = 0.75;                    // resolutions
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
 constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
 constexpr double kLargestFittedCotangent = 3.0777;  // of 18 degrees
@@ -65,6 +65,8 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     std::vector<Facet> facets = facets_of(mesh.carved, mesh.vertices);
     std::vector<const TriangleError*> known(facets.size(), nullptr);
     std::vector<char> seen(facets.size(), 0);  // in the mesh before
+    came_.clear();
+    went_.clear();
     compare(
         facets, facets_,
         [&](std::size_t f, std::size_t old) {
@@ -72,11 +74,14 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
             seen[f] = 1;
         },
         [&](std::size_t f) {
+            if (!distances_.empty()) came_.push_back(facets[f]);
             const auto [corner, whole] = corners_of(mesh.carved, f);
             const int e = expected_ && whole ? expected_->find(corner) : -1;
             if (e >= 0) known[f] = &expected_errors_[e];
         },
-        [](std::size_t) {});
+        [&](std::size_t old) {
+            if (!distances_.empty()) went_.push_back(facets_[old]);
+        });
     std::vector<Triangle> fresh;
     for (std::size_t f = 0; f < facets.size(); ++f)
         if (!known[f]) fresh.push_back(from_least_corner(mesh.carved.triangles[f]));
@@ -98,44 +103,41 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
 }
 
 std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection& result) {
-    const std::vector<Surface::Crossing>& crossings = crossings_.crossings();
     const double cutoff = kLostAt * limits_.tolerance;
     const std::vector<std::size_t> missed_before = std::move(missed_);  // ascending
     missed_.clear();
     if (distances_.empty()) {
-        distances_.assign(crossings.size(), kUnknownDistance);
+        distances_ = crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff);
     } else {
         // What was nearest to a triangle that went is to be measured again; what is nearer to one that came
         // than to all before is measured now.
         const double same = 1e-6 * cutoff;  // rounding
+        constexpr double kUnknown = -1.0;
         const auto for_each_near = [&](const Facet& facet, const auto& body) {
             const auto& [a, b, c] = facet.corner;
             const Vec3 reach = Vec3::Constant(reach_), low = a.cwiseMin(b).cwiseMin(c).cast<double>(),
                        high = a.cwiseMax(b).cwiseMax(c).cast<double>();
             const FacingTriangle triangle(a.cast<double>(), b.cast<double>(), c.cast<double>());
             crossings_.for_each_in(Box(low - reach, high + reach), [&](std::size_t i) {
-                if (distances_[i] != kUnknownDistance) body(triangle, i);
+                if (distances_[i] != kUnknown) body(triangle, i);
             });
         };
-        std::vector<std::size_t> came;
-        compare(
-            facets_, reached_, [](std::size_t, std::size_t) {}, [&](std::size_t f) { came.push_back(f); },
-            [&](std::size_t f) {
-                for_each_near(reached_[f], [&](const FacingTriangle& triangle, std::size_t i) {
-                    const double d = distances_[i] + same;
-                    if (triangle.squared_distance(crossings[i], d * d) <= d * d)
-                        distances_[i] = kUnknownDistance;
-                });
+        std::vector<std::size_t> unknown;
+        for (const Facet& facet : went_)
+            for_each_near(facet, [&](const FacingTriangle& triangle, std::size_t i) {
+                const double d = distances_[i] + same;
+                if (triangle.squared_distance(crossings_[i], d * d) > d * d) return;
+                distances_[i] = kUnknown;
+                unknown.push_back(i);
             });
-        for (const std::size_t f : came)
-            for_each_near(facets_[f], [&](const FacingTriangle& triangle, std::size_t i) {
+        for (const Facet& facet : came_)
+            for_each_near(facet, [&](const FacingTriangle& triangle, std::size_t i) {
                 const double limit = std::min(distances_[i], cutoff),
-                             d2 = triangle.squared_distance(crossings[i], limit * limit);
+                             d2 = triangle.squared_distance(crossings_[i], limit * limit);
                 if (d2 < limit * limit) distances_[i] = std::sqrt(d2);
             });
+        crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, unknown, cutoff, distances_);
     }
-    crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff, distances_);
-    reached_ = facets_;
 
     struct Block {
         std::vector<std::size_t> missed;
@@ -143,10 +145,10 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
         double farthest = 0.0, sum = 0.0;
     };
     constexpr std::size_t kBlock = 32768;
-    std::vector<Block> blocks((crossings.size() + kBlock - 1) / kBlock);
+    std::vector<Block> blocks((crossings_.size() + kBlock - 1) / kBlock);
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
         Block& block = blocks[b];
-        for (std::size_t c = b * kBlock; c < std::min(crossings.size(), (b + 1) * kBlock); ++c) {
+        for (std::size_t c = b * kBlock; c < std::min(crossings_.size(), (b + 1) * kBlock); ++c) {
             if (is_missed(distances_[c])) block.missed.push_back(c);
             if (!std::isfinite(distances_[c])) {
                 ++block.lost;
@@ -164,19 +166,20 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
         sum += block.sum;
     }
     reach_ = result.lost_crossings > 0 ? cutoff : result.farthest_crossing;
-    const std::size_t found = crossings.size() - result.lost_crossings;
+    const std::size_t found = crossings_.size() - result.lost_crossings;
     if (found > 0) result.crossings_mean_square = sum / static_cast<double>(found);
     std::vector<Vec3> in_vain;
     for (const std::size_t c : missed_) {
-        result.missed.push_back(crossings[c]);
+        result.missed.push_back(crossings_[c]);
         if (std::binary_search(missed_before.begin(), missed_before.end(), c))
-            in_vain.push_back(crossings[c].point);
+            in_vain.push_back(crossings_[c].point);
     }
     return in_vain;
 }
 
 Inspection Inspector::inspect(const FrameMesh& mesh) {
     Inspection result;
+    distances_.clear();
     doubt(measure_errors(mesh, result), kVainSpacing, result);
     return result;
 }

@@ -55,7 +55,8 @@ public:
     void inspect_topology(const FrameMesh& mesh, Inspection& inspection);
 
 private:
-    /// Both return what cannot be mended, or was not when it was seen last.
+    /// Measures the triangles that are not those of the mesh before. Both return what cannot be mended, or
+    /// was not when it was seen last.
     std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
     std::vector<Vec3> measure_distances(const FrameMesh& mesh, Inspection& result);
     bool is_missed(double distance) const;
@@ -70,8 +71,8 @@ private:
     double reach_ = 0.0;                          // the largest of the distances, at most the cutoff
     std::vector<Facet> facets_;                   // of the last inspection
     std::vector<TriangleError> errors_;           // of each
-    std::vector<Facet> reached_;                  // of the last inspection of the crossings
-    std::vector<double> distances_;               // to them, per crossing
+    std::vector<Facet> came_, went_;              // since the inspection before
+    std::vector<double> distances_;               // to the facets, per crossing; empty: not measured yet
     std::vector<std::size_t> missed_;             // of the crossings
     std::optional<LatticeSides> sides_;
     int looks_ = 0;  // at the topology

@@ -529,7 +529,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         const StageTimer timer(seconds, "fit");
         fitted.fit_vertices(mesh, particles.size(), surface);
     };
-    const std::size_t crossing_count = work->crossings->crossings().size();
+    const std::size_t crossing_count = work->crossings->size();
     // As long as many particles have to be added their surroundings make room for them.
     std::size_t added = 0;
     for (int mending = 0;; ++mending) {

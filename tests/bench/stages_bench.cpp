@@ -211,7 +211,7 @@ void distances(benchmark::State& state, const Scene& s) {
         result =
             crossing_distances(s.mesh.points, s.mesh.triangles, *s.crossings, 1.5 * s.surface->resolution());
     count_items(state, s.mesh.triangles.size());
-    state.counters["crossings"] = static_cast<double>(s.crossings->crossings().size());
+    state.counters["crossings"] = static_cast<double>(s.crossings->size());
     state.counters["max_error_vx"] =
         *std::max_element(result.begin(), result.end()) / s.surface->resolution();
 }

@@ -255,16 +255,17 @@ TEST(CrossingGrid, FindsWhatIsInABoxAndNothingElse) {
     const auto all = surface->crossings();
     for (const double width : {0.01, 0.2, 100.0}) {
         const CrossingGrid grid(all, width);
-        ASSERT_EQ(grid.crossings().size(), all.size());
+        ASSERT_EQ(grid.size(), all.size());
         for (const Box& box :
-             {Box(Vec3(-0.5, -0.2, 0.3), Vec3(0.4, 0.9, 1.2)), Box(Vec3(-9, -9, -9), Vec3(99, 99, 99)),
-              Box(Vec3(8.9, 4, -5), Vec3(9.1, 6, -3)), Box(Vec3(3, 3, 3), Vec3(4, 4, 4)),
-              Box(Vec3(-50, -1, -1), Vec3(-40, 1, 1))}) {
+             {Box(Vec3(-0.51, -0.21, 0.31), Vec3(0.41, 0.91, 1.21)),  // off the lattice: points are rounded
+              Box(Vec3(-9, -9, -9), Vec3(99, 99, 99)), Box(Vec3(8.91, 4, -5), Vec3(9.11, 6, -3)),
+              Box(Vec3(3, 3, 3), Vec3(4, 4, 4)), Box(Vec3(-50, -1, -1), Vec3(-40, 1, 1))}) {
             std::size_t expected = 0, found = 0;
             for (const auto& c : all) expected += box.contains(c.point);
             std::set<std::size_t> seen;
             grid.for_each_in(box, [&](std::size_t c) {
-                EXPECT_TRUE(box.contains(grid.crossings()[c].point));
+                EXPECT_TRUE(box.contains(grid[c].point));
+                EXPECT_LT(std::abs(surface->probe()->value(grid[c].point)), 0.01);
                 EXPECT_TRUE(seen.insert(c).second);
                 ++found;
             });

@@ -65,10 +65,9 @@ std::vector<double> crossing_distances(const std::vector<Vec3>& points,
                                        const std::vector<Triangle>& triangles, const CrossingGrid& grid,
                                        double cutoff);
 
-constexpr double kUnknownDistance = -1.0;
-
-/// The same for the entries of `distances` that are unknown; the others stay.
+/// The same for some crossings alone: their entries of `distances`; the others stay.
 void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                        const CrossingGrid& grid, double cutoff, std::vector<double>& distances);
+                        const CrossingGrid& grid, const std::vector<std::size_t>& some, double cutoff,
+                        std::vector<double>& distances);
 
 }  // namespace isotrack
