@@ -1,7 +1,8 @@
 // How the DT follows moving particles: the experiment behind the paper's table 1, and warm frames by the
-// share of particles that moved.
+// share of particles that moved, made up and of sequences.
 //
 //     isotrack_update_strategies --particles 3000 --half-axes 1 0.75 0.5 --frames 5000 50000 500000
+//     isotrack_update_strategies --sequences 'liquid.####.vdb' folder --tolerances 0.5 0.05
 //
 // First table: particles crowded at the tips of an ellipsoid spread until they rest, none is born or dies.
 // The paper does not give the axes of its ellipsoid. Ours are three different ones: in a body of revolution
@@ -12,23 +13,35 @@
 // mesh, the DT built anew between batches of them, the particles carried on along their last displacements.
 // Energy: mean over the particles of sum exp(-r^2 / sigma^2) with sigma = d / sqrt(2), d the spacing of a
 // hexagonal packing of as many particles on that area. Second table: time to settle over that of rebuild.
+// Third table, of sequences, instead: the same for the particles that the tracker has in a frame and in the
+// next one, medians over the frames.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
+#include <tuple>
+#include <unordered_map>
 #include <vector>
 
 #include "isotrack/delaunay/tetrahedralisation.h"
+#include "isotrack/error.h"
+#include "isotrack/io/sequence.h"
+#include "isotrack/io/vdb_file.h"
 #include "isotrack/sampling/delaunay_neighbours.h"
 #include "isotrack/sampling/particle_grid.h"
 #include "isotrack/sampling/relaxation.h"
+#include "isotrack/surface/level_set.h"
 #include "isotrack/surface/shapes.h"
+#include "isotrack/tracking/tracker.h"
 
 namespace isotrack::bench {
 namespace {
@@ -217,8 +230,50 @@ void spread(std::size_t count, const Vec3& half_axes) {
         lazy_seconds / seconds, packing.energy / lazy_energy);
 }
 
+/// What it costs to bring a DT from positions to positions: of rebuild in ms, of move, lazy and auto in times
+/// that. None: left out.
+using Costs = std::array<std::optional<double>, 4>;
+
+constexpr std::array<UpdateStrategy, 4> kFollowing = {UpdateStrategy::Rebuild, UpdateStrategy::Move,
+                                                      UpdateStrategy::Lazy, UpdateStrategy::Auto};
+
+std::size_t count_moved(const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
+    std::size_t result = 0;
+    for (std::size_t i = 0; i < from.size(); ++i) result += from[i] != to[i];
+    return result;
+}
+
+/// Those that take particles one after the other are left out where more than `most_moves` move.
+Costs costs_to_follow(const std::vector<Vec3>& from, const std::vector<Vec3>& to, std::size_t most_moves) {
+    const bool too_many = count_moved(from, to) > most_moves;
+    Costs result;
+    double rebuild = 0.0;
+    for (std::size_t s = 0; s < kFollowing.size(); ++s) {
+        const UpdateStrategy strategy = kFollowing[s];
+        if (too_many && (strategy == UpdateStrategy::Move || strategy == UpdateStrategy::Lazy)) continue;
+        const auto dt = make_tetrahedralisation(strategy);
+        dt->assign(from);
+        dt->cells();
+        const double start = now();
+        for (std::size_t i = 0; i < from.size(); ++i)
+            if (from[i] != to[i]) dt->move(static_cast<int>(i), to[i]);
+        dt->settle();
+        dt->cells();
+        const double seconds = now() - start;
+        if (strategy == UpdateStrategy::Rebuild) rebuild = seconds;
+        result[s] = strategy == UpdateStrategy::Rebuild ? 1e3 * seconds : seconds / rebuild;
+    }
+    return result;
+}
+
+void print_costs(const Costs& costs) {
+    for (std::size_t s = 0; s < costs.size(); ++s)
+        fmt::print(" {} |", costs[s] ? fmt::format("{:.{}f}", *costs[s], s == 0 ? 0 : 2) : "-");
+    fmt::print("\n");
+}
+
 /// A share of relaxed particles moves by a tenth of the spacing along the surface.
-void warm_frame(std::size_t count, const Vec3& half_axes) {
+void warm_frame(std::size_t count, const Vec3& half_axes, std::size_t most_moves) {
     const auto ellipsoid = shapes::ellipsoid({0, 0, 0}, half_axes, 0.01);
     const double hexagonal = hexagonal_spacing(half_axes, count);
     Particles particles = bad_start(*ellipsoid, half_axes, count, hexagonal);
@@ -228,52 +283,119 @@ void warm_frame(std::size_t count, const Vec3& half_axes) {
     for (const double share : {0.01, 0.03, 0.1, 0.3, 1.0}) {
         std::mt19937_64 random(2);
         std::uniform_real_distribution<double> unit(-1.0, 1.0);
-        std::vector<std::pair<int, Vec3>> moves;
+        std::vector<Vec3> to = particles.position;
         for (std::size_t i = 0; i < count; ++i) {
             if (0.5 * (unit(random) + 1.0) >= share) continue;
             const Vec3 step(unit(random), unit(random), unit(random));
-            if (const auto p = probe->project(particles.position[i] + 0.1 * hexagonal * step))
-                moves.emplace_back(static_cast<int>(i), *p);
+            if (const auto p = probe->project(particles.position[i] + 0.1 * hexagonal * step)) to[i] = *p;
         }
-        double rebuild = 0.0;
         fmt::print("| {} | {:.0f} % |", count, 100.0 * share);
-        for (const UpdateStrategy strategy :
-             {UpdateStrategy::Rebuild, UpdateStrategy::Move, UpdateStrategy::Lazy, UpdateStrategy::Auto}) {
-            const auto dt = make_tetrahedralisation(strategy);
-            dt->assign(particles.position);
-            dt->cells();
-            const double from = now();
-            for (const auto& [i, p] : moves) dt->move(i, p);
-            dt->settle();
-            dt->cells();
-            const double seconds = now() - from;
-            if (strategy == UpdateStrategy::Rebuild) {
-                rebuild = seconds;
-                fmt::print(" {:.0f} |", 1e3 * seconds);
-            } else {
-                fmt::print(" {:.2f} |", seconds / rebuild);
-            }
-        }
-        fmt::print("\n");
+        print_costs(costs_to_follow(particles.position, to, most_moves));
     }
+}
+
+/// Of the particles that live in both of two frames that follow each other.
+struct Pair {
+    std::vector<Vec3> from, to;
+    std::size_t farther = 0;  ///< How many moved by more than a tenth of their spacing.
+};
+
+Pair pair_of(const Particles& before, const Particles& after) {
+    std::unordered_map<Id, std::size_t> place;
+    for (std::size_t i = 0; i < before.size(); ++i) place.emplace(before.id[i], i);
+    Pair result;
+    for (std::size_t i = 0; i < after.size(); ++i) {
+        const auto found = place.find(after.id[i]);
+        if (found == place.end()) continue;
+        const Vec3& from = before.position[found->second];
+        result.from.push_back(from);
+        result.to.push_back(after.position[i]);
+        if ((after.position[i] - from).norm() > 0.1 * after.spacing[i]) ++result.farther;
+    }
+    return result;
+}
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+/// A row of medians over the pairs of frames.
+void follow_sequence(const std::string& input, double tolerance_voxels, std::size_t most_moves) {
+    std::optional<Tracker> tracker;
+    Particles before;
+    std::vector<double> particles, moved, farther;
+    std::array<std::vector<double>, std::tuple_size_v<Costs>> costs;
+    for (const InputFrame& frame : find_frames({input}).frames) {
+        const LevelSet surface(read_grid(frame.path, choose_grid(list_grids(frame.path), {}, frame.path)));
+        if (!tracker) {
+            TrackerOptions options;
+            options.tolerance = tolerance_voxels * surface.voxel_size();
+            tracker.emplace(options);
+        }
+        tracker->advance(surface);
+        const Pair pair = pair_of(before, tracker->particles());
+        before = tracker->particles();
+        if (pair.from.empty()) continue;
+        const auto count = static_cast<double>(pair.from.size());
+        particles.push_back(count);
+        moved.push_back(100.0 * static_cast<double>(count_moved(pair.from, pair.to)) / count);
+        farther.push_back(100.0 * static_cast<double>(pair.farther) / count);
+        const Costs of_pair = costs_to_follow(pair.from, pair.to, most_moves);
+        for (std::size_t s = 0; s < costs.size(); ++s)
+            if (of_pair[s]) costs[s].push_back(*of_pair[s]);
+    }
+    if (particles.empty()) throw InputError(input + ": no two frames with particles that live in both");
+    Costs medians;
+    for (std::size_t s = 0; s < costs.size(); ++s)
+        if (!costs[s].empty()) medians[s] = median(costs[s]);
+    fmt::print("| {} | {} | {} | {:.0f} | {:.0f} % | {:.0f} % |", input, tolerance_voxels, particles.size(),
+               median(particles), median(moved), median(farther));
+    print_costs(medians);
 }
 
 }  // namespace
 }  // namespace isotrack::bench
 
 int main(int argc, char** argv) {
+    using namespace isotrack::bench;
     CLI::App app{"How the Delaunay tetrahedralisation follows moving particles"};
-    std::size_t particles = 3000;
+    std::size_t particles = 3000, most_moves = 100000;
     std::array<double, 3> axes = {1.0, 0.75, 0.5};
     std::vector<std::size_t> frames = {5000, 50000};
+    std::vector<std::string> sequences;
+    std::vector<double> tolerances = {0.5};
     app.add_option("--particles", particles, "On the ellipsoid")->capture_default_str();
     app.add_option("--half-axes", axes, "Of the ellipsoid")->capture_default_str();
     app.add_option("--frames", frames, "Sizes of warm frames")->capture_default_str();
+    app.add_option("--sequences", sequences,
+                   "Patterns or folders of VDB files, each a sequence: the table of these, and no other");
+    app.add_option("--tolerances", tolerances, "Of the sequences, in voxels: a row for each")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--most-moves", most_moves,
+                   "Where more particles move, move and lazy, which take minutes then, are left out")
+        ->capture_default_str();
     CLI11_PARSE(app, argc, argv);
-    const isotrack::Vec3 half_axes(axes[0], axes[1], axes[2]);
-    isotrack::bench::spread(particles, half_axes);
-    fmt::print(
-        "| particles | moved | rebuild, ms | move, times that | lazy | auto "
-        "|\n|---:|---:|---:|---:|---:|---:|\n");
-    for (const std::size_t count : frames) isotrack::bench::warm_frame(count, half_axes);
+    constexpr const char* kColumns = "rebuild, ms | move, times that | lazy | auto |";
+    try {
+        if (sequences.empty()) {
+            const isotrack::Vec3 half_axes(axes[0], axes[1], axes[2]);
+            spread(particles, half_axes);
+            fmt::print("| particles | moved | {}\n|---:|---:|---:|---:|---:|---:|\n", kColumns);
+            for (const std::size_t count : frames) warm_frame(count, half_axes, most_moves);
+        } else {
+            fmt::print(
+                "| sequence | tolerance, voxels | pairs of frames | particles in both | moved | farther than "
+                "a tenth of their spacing | {}\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
+                kColumns);
+            for (const std::string& sequence : sequences)
+                for (const double tolerance : tolerances) follow_sequence(sequence, tolerance, most_moves);
+        }
+        fmt::print("\nMove and lazy take minutes where more than {} particles move: left out.\n", most_moves);
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "{}\n", error.what());
+        return 1;
+    }
 }
