@@ -363,7 +363,7 @@ int main(int argc, char** argv) {
     CLI::App app{"How the Delaunay tetrahedralisation follows moving particles"};
     std::size_t particles = 3000, most_moves = 100000;
     std::array<double, 3> axes = {1.0, 0.75, 0.5};
-    std::vector<std::size_t> frames = {5000, 50000};
+    std::vector<std::size_t> frames = {5000, 50000, 500000};
     std::vector<std::string> sequences;
     std::vector<double> tolerances = {0.5};
     app.add_option("--particles", particles, "On the ellipsoid")->capture_default_str();
