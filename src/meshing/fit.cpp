@@ -24,7 +24,6 @@ constexpr double kWeight[3] = {54.0, 12.0, 7.0};  // in the middle, on an edge, 
 
 constexpr double kRelaxation = 1.5;   // the shares of the neighbours make each step too short
 constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
-constexpr double kDamping = 0.02;     // of the quadric's trace: how freely a vertex slides along the surface
 constexpr double kLargestCotangent = 1.7320508075688772;  // of 30 degrees
 constexpr int kHalvings = 2;  // of the steps around a spoilt triangle, before they are taken back
 
@@ -68,7 +67,7 @@ bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const
 }  // namespace
 
 void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& all_triangles, const Surface& surface,
-         int steps, const std::vector<char>& movable) {
+         int steps, const std::vector<char>& movable, double damping) {
     const auto moves = [&](int v) { return movable.empty() || movable[v]; };
     std::vector<Triangle> triangles;
     std::vector<int> moving;
@@ -114,7 +113,7 @@ void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& all_triangles
             to[v] = vertices[v];
             const double trace = quadric.trace();
             if (!(trace > 0.0)) return;
-            quadric.diagonal().array() += kDamping * trace;
+            quadric.diagonal().array() += damping * trace;
             Vec3 move = -kRelaxation * quadric.ldlt().solve(pull);
             const double length = move.norm(), limit = kLargestStep * std::sqrt(shortest2);
             if (length > limit) move *= limit / length;

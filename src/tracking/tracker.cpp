@@ -31,6 +31,7 @@
 #include "tracking/fitted.h"
 #include "tracking/inspection.h"
 #include "tracking/refinement.h"
+#include "tracking/refitted.h"
 
 namespace isotrack {
 namespace {
@@ -61,7 +62,7 @@ constexpr double kMostPerCrossing = 0.5;
 constexpr std::size_t kMostAnyway = 1000;
 constexpr double kFitWideExponent = 0.5;
 constexpr int kBluntRounds = 3, kBluntPasses = 12;
-constexpr double kBluntShare = 0.96;    // of the tolerance, for the triangles they change
+constexpr double kBluntShare = 0.96;    // of the tolerance, for the triangles they or the refit change
 constexpr double kAngleFloor = 2.0;     // details: sharp edges are as round as they make them
 constexpr double kLeastSpacing = 5e-4;  // resolutions: a single node inside may leave no more than that
 
@@ -165,22 +166,34 @@ struct Work {
     std::optional<Inspector> inspector;  // of this mesh
     Inspection inspection;
 
+    /// The vertices that stand for a particle alone: copies stay where they are.
+    std::vector<char> movable() const {
+        const auto& particle = mesh.carved.particle;
+        const int last = particle.empty() ? -1 : *std::max_element(particle.begin(), particle.end());
+        std::vector<int> vertex(last + 1, -1);
+        std::vector<char> result;
+        for (const int p : particle) {
+            const int v = static_cast<int>(result.size());
+            result.push_back(p >= 0 && vertex[p] < 0);
+            if (p < 0) continue;
+            if (vertex[p] >= 0) result[vertex[p]] = 0;
+            vertex[p] = v;
+        }
+        return result;
+    }
+
+    /// Fits the mesh once more, with other diagonals, as far as it goes on reaching all it reached.
+    void refit() {
+        const StageTimer timer(frame.seconds, "fit");
+        inspection =
+            refit_within(mesh, inspection, movable(), surface, kBluntShare * limits.tolerance, *inspector);
+    }
+
     /// Makes sharp triangles blunter where the mesh goes on reaching all it reached. The particles stay where
     /// they are: the next frame's triangles are others.
     void blunt() {
         const StageTimer timer(frame.seconds, "blunt");
-        const auto& particle = mesh.carved.particle;
-        const int last = particle.empty() ? -1 : *std::max_element(particle.begin(), particle.end());
-        std::vector<int> vertex(last + 1, -1);
-        std::vector<char> movable;
-        for (const int p : particle) {
-            const int v = static_cast<int>(movable.size());
-            movable.push_back(p >= 0 && vertex[p] < 0);
-            if (p < 0) continue;
-            if (vertex[p] >= 0) movable[vertex[p]] = 0;  // copies stay where they are
-            vertex[p] = v;
-        }
-        Blunter blunter(mesh.vertices, mesh.carved.triangles, std::move(movable), surface, *crossings,
+        Blunter blunter(mesh.vertices, mesh.carved.triangles, movable(), surface, *crossings,
                         kBluntShare * limits.tolerance);
         const auto missed = [&] {
             std::vector<std::array<double, 3>> places;
@@ -210,8 +223,9 @@ struct Work {
         }
     }
 
-    TrackedFrame finish(Method method) {
-        if (method != Method::Paper) blunt();
+    TrackedFrame finish(const TrackerOptions& options) {
+        if (options.method != Method::Paper && options.fit) refit();
+        if (options.method != Method::Paper) blunt();
         report(mesh, inspection, limits, frame);
         frame.mesh.points = std::move(mesh.vertices);
         frame.mesh.triangles = std::move(mesh.carved.triangles);
@@ -599,10 +613,9 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     const std::unordered_set<Id> now(particles.id.begin(), particles.id.end());
     for (const Id id : particles.id) frame.born += id >= first_new;
     for (const Id id : before) frame.died += now.count(id) == 0;
-    if (options.border == Border::Close)
-        return [work, method = options.method] { return work->finish(method); };
+    if (options.border == Border::Close) return [work, options = options] { return work->finish(options); };
 
-    frame = work->finish(options.method);  // ids of what is cut open are given in the order of the frames
+    frame = work->finish(options);  // ids of what is cut open are given in the order of the frames
     std::vector<char> at_border;
     for (const Vec3& p : frame.mesh.points) at_border.push_back(surface.at_border(p));
     frame.opened = open_border(frame.mesh, at_border, next_id) > 0;

@@ -17,8 +17,9 @@ namespace isotrack {
 /// A step is at most a tenth of the shortest edge around the vertex. No triangle turns over, and none gets a
 /// smallest angle below 30 degrees unless it had one; then it gets no smaller. Connectivity stays; triangles
 /// far apart along the mesh may come to cross. `movable`: a flag per vertex, the others stay; empty: all
-/// move. Uses TBB inside; same result at any thread count.
+/// move. `damping`: of the quadric's trace, > 0; the less, the more freely a vertex slides along the surface.
+/// Uses TBB inside; same result at any thread count.
 void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, const Surface& surface,
-         int steps, const std::vector<char>& movable = {});
+         int steps, const std::vector<char>& movable = {}, double damping = 0.02);
 
 }  // namespace isotrack
