@@ -34,10 +34,11 @@ struct Star {
         }
         mean_edge /= static_cast<double>(triangle.size());
     }
-    /// The cotangent of the smallest angle with the vertex at x.
-    double sharpness_at(const Vec3& x) const {
+    /// The cotangent of the smallest angle with the vertex at x; anything above `enough` where it is.
+    double sharpness_at(const Vec3& x, double enough = std::numeric_limits<double>::infinity()) const {
         double result = 0.0;
-        for (const auto& [a, b] : opposite) result = std::max(result, sharpness(x, a, b));
+        for (std::size_t i = 0; i < opposite.size() && result <= enough; ++i)
+            result = std::max(result, sharpness(x, opposite[i][0], opposite[i][1]));
         return result;
     }
 };
@@ -52,7 +53,7 @@ Vec3 bluntest_place(const Star& star, const Vec3& from, const Vec3& normal) {
         for (int way = 0; way < kWays; ++way) {
             const double angle = way * (2.0 * M_PI / kWays);
             const Vec3 x = centre + step * star.mean_edge * (std::cos(angle) * u + std::sin(angle) * v);
-            if (const double s = star.sharpness_at(x); s < least) {
+            if (const double s = star.sharpness_at(x, least); s < least) {
                 least = s;
                 best = x;
             }
@@ -100,7 +101,7 @@ std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
                 for (int y = -1; y <= 1; ++y)
                     for (int z = -1; z <= 1; ++z) {
                         const Vec3 there = to_float_precision(best + step * star.mean_edge * Vec3(x, y, z));
-                        if (const double s = star.sharpness_at(there); s < least)
+                        if (const double s = star.sharpness_at(there, least); s < least)
                             blunter.emplace_back(s, there);
                     }
             std::sort(blunter.begin(), blunter.end(),
