@@ -91,9 +91,9 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
 }
 
 int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution) {
-    constexpr int kFew = 3, kMany = 6;  // multiples of 3 hold the centroid
+    constexpr double kFewest = 3.0, kMost = 6.0;
     const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-    return longest2 <= kFew * resolution * kFew * resolution ? kFew : kMany;
+    return static_cast<int>(std::clamp(std::ceil(std::sqrt(longest2) / resolution), kFewest, kMost));
 }
 
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,

@@ -24,8 +24,8 @@ struct TriangleError {
 TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
                              double refine_above = std::numeric_limits<double>::infinity());
 
-/// The intervals per edge that show the error of triangle abc: 6, or 3 where its longest edge is at most
-/// three resolutions of the surface.
+/// The intervals per edge that show the error of triangle abc: one per resolution of the surface on its
+/// longest edge, but 3 at least and 6 at most.
 int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution);
 constexpr int kStepsByLength = 0;  ///< Instead of a number: what `error_steps` says.
 
