@@ -114,31 +114,12 @@ bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replac
     return std::all_of(candidates.begin(), candidates.end(), is_near) && reach_what(before, candidates);
 }
 
-std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& except) const {
+std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& except) {
+    if (!boxes) boxes.emplace(points, triangles);
     std::vector<Triangle> result;
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        if (box.intersects(box_of(points, triangles[t])) &&
-            !std::binary_search(except.begin(), except.end(), static_cast<int>(t)))
-            result.push_back(triangles[t]);
+    for (const int t : boxes->meeting(box))
+        if (!std::binary_search(except.begin(), except.end(), t)) result.push_back(triangles[t]);
     return result;
-}
-
-bool BluntedMesh::crosses(const std::vector<Triangle>& candidates,
-                          const std::vector<Triangle>& others) const {
-    TriangleMesh mesh;
-    mesh.triangles = candidates;
-    mesh.triangles.insert(mesh.triangles.end(), others.begin(), others.end());
-    std::vector<int> used;
-    for (const Triangle& t : mesh.triangles) used.insert(used.end(), t.begin(), t.end());
-    std::sort(used.begin(), used.end());
-    used.erase(std::unique(used.begin(), used.end()), used.end());
-    for (const int v : used) mesh.points.push_back(points[v]);
-    for (Triangle& t : mesh.triangles)
-        for (int& v : t) v = static_cast<int>(std::lower_bound(used.begin(), used.end(), v) - used.begin());
-    const auto pairs = self_intersections(mesh);
-    return std::any_of(pairs.begin(), pairs.end(), [&](const auto& pair) {
-        return static_cast<std::size_t>(std::min(pair.first, pair.second)) < candidates.size();
-    });
 }
 
 Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
@@ -187,7 +168,8 @@ bool Blunter::pass() {
                      surface_.resolution(),
                      *probe,
                      crossings_,
-                     std::vector<char>(points_.size(), 0)};
+                     std::vector<char>(points_.size(), 0),
+                     std::nullopt};
     for (const auto& [sharpest, t] : sharp) {
         for (const int v : triangles_[t])
             if (mesh.touched[v]) open_[v] = 1;
@@ -195,6 +177,7 @@ bool Blunter::pass() {
         if (!change) change = nudge(mesh, t, -sharpest);
         if (!change) continue;
         for (const int changed : change->triangle) {
+            if (mesh.boxes) mesh.boxes->note(changed);
             unchecked_[changed] = 1;
             for (const int v : triangles_[changed]) open_[v] = 1;
         }

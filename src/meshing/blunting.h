@@ -7,6 +7,7 @@
 #include "isotrack/meshing/blunting.h"
 #include "isotrack/meshing/certify.h"
 #include "meshing/corners.h"
+#include "meshing/triangle_boxes.h"
 
 namespace isotrack {
 
@@ -28,7 +29,8 @@ struct BluntedMesh {
     double resolution;  ///< Of the surface.
     Surface::Probe& probe;
     const CrossingGrid& crossings;
-    std::vector<char> touched;  ///< Per vertex: a change is near.
+    std::vector<char> touched;                          ///< Per vertex: a change is near.
+    std::optional<TriangleBoxes> boxes = std::nullopt;  ///< Made when they are asked for.
 
     double sharpness_of(const Triangle& t) const;
     Replaced replaced(const std::vector<Triangle>& some) const;
@@ -36,9 +38,7 @@ struct BluntedMesh {
     /// within the tolerance of it, and keep what those stand for of the crossings within the tolerance.
     bool may_have(const std::vector<Triangle>& candidates, const Replaced& before) const;
     /// The triangles but `except` (ascending) whose boxes meet this one.
-    std::vector<Triangle> near(const Box& box, const std::vector<int>& except) const;
-    /// Whether some of these triangles cross each other or some of the others.
-    bool crosses(const std::vector<Triangle>& candidates, const std::vector<Triangle>& others) const;
+    std::vector<Triangle> near(const Box& box, const std::vector<int>& except);
 
 private:
     double facing(const std::vector<Triangle>& some) const;

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "isotrack/meshing/self_intersections.h"
 #include "meshing/blunting.h"
 #include "meshing/corners.h"
 #include "meshing/sharpness.h"
@@ -108,7 +109,7 @@ std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
                       [](const auto& p, const auto& q) { return p.first < q.first; });
             const auto found = std::find_if(blunter.begin(), blunter.end(), [&](const auto& candidate) {
                 points[v] = candidate.second;
-                return mesh.may_have(around, before) && !mesh.crosses(around, others);
+                return mesh.may_have(around, before) && !any_cross(points, around, others);
             });
             if (found == blunter.end())
                 step *= 0.5;

@@ -49,9 +49,9 @@ bool meets(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec
 
 /// Whether two triangles with area share more than their common vertices and edges. Vertices are common by
 /// place.
-bool cross(const TriangleMesh& mesh, const Triangle& first, const Triangle& second) {
-    const Vec3* const a[3] = {&mesh.points[first[0]], &mesh.points[first[1]], &mesh.points[first[2]]};
-    const Vec3* const b[3] = {&mesh.points[second[0]], &mesh.points[second[1]], &mesh.points[second[2]]};
+bool cross(const std::vector<Vec3>& points, const Triangle& first, const Triangle& second) {
+    const Vec3* const a[3] = {&points[first[0]], &points[first[1]], &points[first[2]]};
+    const Vec3* const b[3] = {&points[second[0]], &points[second[1]], &points[second[2]]};
     int common = 0;
     int in_a = 0, in_b = 0;  // sums of the positions that are common
     for (int i = 0; i < 3; ++i)
@@ -172,7 +172,7 @@ std::vector<std::pair<int, int>> self_intersections(const TriangleMesh& mesh) {
     tbb::parallel_for(std::size_t(0), slabs.size(), [&](std::size_t k) {
         Slab& slab = slabs[k];
         const auto test = [&](const TriangleBox& a, const TriangleBox& b) {
-            if (cross(mesh, mesh.triangles[a.triangle], mesh.triangles[b.triangle]))
+            if (cross(mesh.points, mesh.triangles[a.triangle], mesh.triangles[b.triangle]))
                 found[k].push_back(std::minmax(a.triangle, b.triangle));
         };
         CGAL::box_self_intersection_d(slab.own.begin(), slab.own.end(), test, kScanBelow);
@@ -184,6 +184,25 @@ std::vector<std::pair<int, int>> self_intersections(const TriangleMesh& mesh) {
     for (const Pairs& pairs : found) result.insert(result.end(), pairs.begin(), pairs.end());
     std::sort(result.begin(), result.end());
     return result;
+}
+
+bool any_cross(const std::vector<Vec3>& points, const std::vector<Triangle>& some,
+               const std::vector<Triangle>& others) {
+    const auto box_of = [&](const Triangle& t) {
+        const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+        return Box(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c));
+    };
+    const auto area = [&](const Triangle& t) { return has_area(points[t[0]], points[t[1]], points[t[2]]); };
+    for (auto t = some.begin(); t != some.end(); ++t) {
+        if (!area(*t)) continue;
+        const Box box = box_of(*t);
+        const auto meets = [&](const Triangle& other) {
+            return box.intersects(box_of(other)) && area(other) && cross(points, *t, other);
+        };
+        if (std::any_of(t + 1, some.end(), meets) || std::any_of(others.begin(), others.end(), meets))
+            return true;
+    }
+    return false;
 }
 
 }  // namespace isotrack

@@ -148,6 +148,30 @@ TEST(SelfIntersections, AgreesWithConstructedIntersectionsOnLatticeSoups) {
     }
 }
 
+TEST(AnyCross, IsWhetherAPairHasOneOfTheFirst) {
+    std::mt19937 random(7);
+    int with = 0, without = 0;
+    for (int round = 0; round < 400; ++round) {
+        TriangleMesh soup;
+        for (int i = 0; i < 12; ++i)
+            soup.points.emplace_back(static_cast<int>(random() % 5), static_cast<int>(random() % 5),
+                                     static_cast<int>(random() % 5));
+        for (int i = 0; i < 6; ++i)
+            soup.triangles.push_back({static_cast<int>(random() % 12), static_cast<int>(random() % 12),
+                                      static_cast<int>(random() % 12)});
+        constexpr int kSome = 2;
+        const std::vector<Triangle> some(soup.triangles.begin(), soup.triangles.begin() + kSome),
+            others(soup.triangles.begin() + kSome, soup.triangles.end());
+        const Pairs pairs = intersections_by_construction(soup);
+        const bool expected =
+            std::any_of(pairs.begin(), pairs.end(), [](const auto& pair) { return pair.first < kSome; });
+        EXPECT_EQ(any_cross(soup.points, some, others), expected);
+        ++(expected ? with : without);
+    }
+    EXPECT_GT(with, 50);
+    EXPECT_GT(without, 50);
+}
+
 // The cheap test that sets neighbours round a vertex apart must never be wrong, however thin the wedges.
 TEST(SelfIntersections, AgreesWithConstructedIntersectionsRoundAVertex) {
     std::mt19937 random(5);

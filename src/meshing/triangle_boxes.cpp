@@ -1,0 +1,65 @@
+#include "meshing/triangle_boxes.h"
+
+#include <algorithm>
+#include <boost/geometry/geometries/box.hpp>
+#include <boost/geometry/geometries/point.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <iterator>
+#include <utility>
+
+namespace isotrack {
+namespace {
+
+using TreePoint = boost::geometry::model::point<double, 3, boost::geometry::cs::cartesian>;
+using TreeBox = boost::geometry::model::box<TreePoint>;
+using Entry = std::pair<TreeBox, int>;
+using Tree = boost::geometry::index::rtree<Entry, boost::geometry::index::quadratic<16>>;
+
+TreeBox to_tree(const Box& box) {
+    return {{box.min().x(), box.min().y(), box.min().z()}, {box.max().x(), box.max().y(), box.max().z()}};
+}
+
+}  // namespace
+
+/// Boxes of what a triangle was stay in the tree: it is found more often than needed, and looked at as it is.
+struct TriangleBoxes::Impl {
+    const std::vector<Vec3>& points;
+    const std::vector<Triangle>& triangles;
+    Tree tree;
+
+    Box box_of(int triangle) const {
+        const auto& [i, j, k] = triangles[triangle];
+        return Box(points[i].cwiseMin(points[j]).cwiseMin(points[k]),
+                   points[i].cwiseMax(points[j]).cwiseMax(points[k]));
+    }
+};
+
+TriangleBoxes::TriangleBoxes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles)
+    : impl_(new Impl{points, triangles, Tree()}) {
+    std::vector<Entry> entries;
+    entries.reserve(triangles.size());
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        entries.emplace_back(to_tree(impl_->box_of(static_cast<int>(t))), static_cast<int>(t));
+    impl_->tree = Tree(entries.begin(), entries.end());
+}
+
+TriangleBoxes::~TriangleBoxes() = default;
+
+void TriangleBoxes::note(int changed_triangle) {
+    impl_->tree.insert({to_tree(impl_->box_of(changed_triangle)), changed_triangle});
+}
+
+std::vector<int> TriangleBoxes::meeting(const Box& box) const {
+    std::vector<Entry> found;
+    impl_->tree.query(boost::geometry::index::intersects(to_tree(box)), std::back_inserter(found));
+    std::vector<int> result;
+    for (const Entry& entry : found) result.push_back(entry.second);
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    result.erase(std::remove_if(result.begin(), result.end(),
+                                [&](int t) { return !impl_->box_of(t).intersects(box); }),
+                 result.end());
+    return result;
+}
+
+}  // namespace isotrack
