@@ -40,7 +40,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 3, kWarmRounds = 2;
 constexpr int kMendingSweeps = 3;
 constexpr int kMostMendings = 3;
-constexpr double kFew = 0.03;  // of the particles: few enough to be added by certify, without relaxation
+constexpr double kFew = 0.02;  // of the particles: few enough to be added by certify, without relaxation
 /// How fast the population goes after the wanted spacing.
 struct Pace {
     PopulationBand band;
@@ -224,8 +224,8 @@ struct Work {
     }
 
     TrackedFrame finish(const TrackerOptions& options) {
-        if (options.method != Method::Paper && options.fit) refit();
         if (options.method != Method::Paper) blunt();
+        if (options.method != Method::Paper && options.fit) refit();
         report(mesh, inspection, limits, frame);
         frame.mesh.points = std::move(mesh.vertices);
         frame.mesh.triangles = std::move(mesh.carved.triangles);
