@@ -139,13 +139,14 @@ std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
     constexpr double kGoldenAngle = 2.399963;
     const std::size_t before = particles_.size();
     if (shortages.empty() || before >= most_) return 0;
+    first_of_call_ = static_cast<int>(before);
     for (; in_grid_ < before; ++in_grid_)
         grid_.insert(particles_.position[in_grid_], static_cast<int>(in_grid_));
     std::vector<char> surrounded(before, 0);
     for (const Shortage& s : shortages) {
         const double wanted = std::max(s.spacing, min_spacing_);
         const int there = add(s.place, wanted);
-        if (there < 0 || static_cast<std::size_t>(there) >= before || surrounded[there]) continue;
+        if (there < 0 || there >= first_of_call_ || surrounded[there]) continue;
         surrounded[there] = 1;
         const double h = kShrink * std::min(wanted, particles_.spacing[there]);
         if (h < std::max(min_spacing_, s.least)) continue;
@@ -162,22 +163,31 @@ std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
 }
 
 int Densifier::add(const Vec3& place, double h) {
-    constexpr double kApart = 0.7;
+    constexpr double kApart = 0.7, kFar = 10.0;
+    constexpr double kFarthest = 8.0;  // resolutions
     int nearest = -1;
     if (particles_.size() >= most_) return nearest;
     const auto projected = probe_->project(place);
     if (!projected) return nearest;
     const Vec3 p = to_float_precision(*projected), n = probe_->normal(p);
-    double least = kApart * h * kApart * h;
-    grid_.for_each_within(p, kApart * h, [&](int i, double d2) {
-        if (d2 > least || !(particles_.normal[i].dot(n) > 0.0)) return;
+    const double apart = kApart * h,
+                 far = std::max(apart, std::min(kFar * h, kFarthest * surface_.resolution()));
+    double least = far * far;
+    bool taken = false;
+    grid_.for_each_within(p, far, [&](int i, double d2) {
+        if (!(particles_.normal[i].dot(n) > 0.0)) return;
+        const double own = kApart * particles_.spacing[i];
+        taken = taken || (i >= first_of_call_ && d2 < own * own);
+        if (d2 > least) return;
         least = d2;
         nearest = i;
     });
-    const double apart = std::sqrt(least);
-    if (nearest >= 0 && apart < kApart * particles_.spacing[nearest]) return nearest;
+    const double distance = std::sqrt(least);
+    if (taken || (nearest >= 0 && distance < std::min(apart, kApart * particles_.spacing[nearest])))
+        return nearest;
     grid_.insert(p, static_cast<int>(in_grid_++));
-    particles_.add(p, n, std::max(apart / kApart, min_spacing_), next_id_++);
+    const double spacing = distance < apart ? distance / kApart : std::max(distance, h);
+    particles_.add(p, n, std::max(spacing, min_spacing_), next_id_++);
     return -1;
 }
 

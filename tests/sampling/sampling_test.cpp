@@ -485,6 +485,23 @@ TEST(Densifier, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
             EXPECT_GE((particles.position[i] - particles.position[j]).norm(), 0.7 * 0.05);
 }
 
+TEST(Densifier, GivesRoomForOneAtATimeWhereParticlesAreFarApart) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    Particles particles;
+    particles.add({0, 0, 1}, {0, 0, 1}, 0.8, 0);
+    Id next_id = 1;
+    Densifier densifier(particles, *sphere, 0.01, 1000, next_id);
+    const Vec3 place = Vec3(0.6, 0, 0.8), beside = Vec3(0.65, 0.02, 0.76).normalized();
+    const std::vector<Shortage> both = {{place, 0.1}, {beside, 0.1}};
+    EXPECT_EQ(densifier.add(both), 1u);
+    EXPECT_NEAR(particles.spacing[1], (place - Vec3(0, 0, 1)).norm(), 1e-3);
+    // What is still short of particles then gets them.
+    EXPECT_GT(densifier.add({{Vec3(0.9, 0, 0.4).normalized(), 0.1}}), 0u);
+    // None is near, and no farther than eight resolutions is looked.
+    EXPECT_EQ(densifier.add({{{0, 0, -1}, 0.1}}), 1u);
+    EXPECT_NEAR(particles.spacing.back(), 0.8, 1e-6);
+}
+
 TEST(CoordinateDescent, SpreadsParticlesOverAnEllipsoidByItsCurvature) {
     const auto ellipsoid = shapes::ellipsoid({0, 0, 0}, {1.0, 0.5, 0.5}, 0.02);
     SizingLimits limits{};
