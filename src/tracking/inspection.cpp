@@ -13,8 +13,9 @@
 namespace isotrack {
 namespace {
 
-constexpr double kLostAt = 3.0;                            // tolerances
-constexpr double kFaultReach = 1.5;                        // resolutions
+constexpr double kLostAt = 3.0;      // tolerances
+constexpr double kMany = 0.3;        // of the triangles: when more change all distances are measured again
+constexpr double kFaultReach = 1.5;  // resolutions
 constexpr double kMissedSpacing = 0.75;                    // resolutions
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
 constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
@@ -106,7 +107,8 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
     const double cutoff = kLostAt * limits_.tolerance;
     const std::vector<std::size_t> missed_before = std::move(missed_);  // ascending
     missed_.clear();
-    if (distances_.empty()) {
+    if (distances_.empty() ||
+        kMany * static_cast<double>(facets_.size()) < static_cast<double>(went_.size())) {
         distances_ = crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff);
     } else {
         // What was nearest to a triangle that went is to be measured again; what is nearer to one that came

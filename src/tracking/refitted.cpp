@@ -15,7 +15,7 @@ namespace isotrack {
 namespace {
 
 constexpr double kLargestCotangent = 1.7320508075688772;  // of 30 degrees
-constexpr double kPoor = 0.05;  // of the tolerance: a triangle with a larger RMS error is worth the time
+constexpr double kPoor = 0.1;   // of the tolerance: a triangle with a larger RMS error is worth the time
 constexpr double kReach = 1.5;  // tolerances: a triangle that near may have stood for a crossing
 
 /// What a refit changed, and can be taken back: flips by groups that share triangles, vertices one by one.

@@ -9,14 +9,15 @@
 
 namespace isotrack {
 
-/// Lowers the squared distance between triangles and surface by flips of edges and a long `fit` in turns: an
-/// edge across a crease cuts it, and a fit cannot help that; once edges follow the crease, it moves them onto
-/// it. The mesh must be closed, oriented and manifold, and stays so; its topology does not change.
+/// Lowers the squared distance between triangles and surface by flips of edges and a few steps of `fit` in
+/// turns: an edge across a crease cuts it, and a fit cannot help that; once edges follow the crease, it moves
+/// them onto it. The mesh must be closed, oriented and manifold, and stays so; its topology does not change.
 ///
-/// An edge flips where the error of its two triangles, area times mean square, falls by a tenth or more;
-/// where none of the new ones has an angle below 30 degrees, or below what the old ones had; where both are
-/// within `tolerance` and face the way the surface does, or no worse than the old ones. `movable`: a flag per
-/// vertex; the others stay, and so do triangles that have no such vertex.
+/// An edge flips where the error of its two triangles, area times mean square, falls by a tenth or more, and
+/// is at least a quarter of what it is on average; where none of the new ones has an angle below 30 degrees,
+/// or below what the old ones had; where both are within `tolerance` and face the way the surface does, or no
+/// worse than the old ones. `movable`: a flag per vertex; the others stay, and so do triangles that have no
+/// such vertex.
 ///
 /// Returns the two triangles of each flip, in order. A flip puts its new triangles in the places of the old
 /// and makes no edge that the mesh had at the start, so those that share no triangle with the others can be
