@@ -245,12 +245,14 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
     // a corner joins them to others.
     std::vector<std::uint32_t> truth(wrong.size());
     std::vector<char> lost(wrong.size());
-    for (std::size_t w = 0; w < wrong.size(); ++w) {
-        truth[w] = around[w].inside;
-        for (int bit = 0; bit < 27; ++bit)
-            if (around[w].wrong[bit] >= 0) truth[w] ^= 1u << bit;
-        lost[w] = (truth[w] >> bit_of(0, 0, 0) & 1u) != 0;
-    }
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, wrong.size(), 1024), [&](const auto& range) {
+        for (std::size_t w = range.begin(); w < range.end(); ++w) {
+            truth[w] = around[w].inside;
+            for (int bit = 0; bit < 27; ++bit)
+                if (around[w].wrong[bit] >= 0) truth[w] ^= 1u << bit;
+            lost[w] = (truth[w] >> bit_of(0, 0, 0) & 1u) != 0;
+        }
+    });
     const auto is_held = [&](std::size_t w) {
         for (int x = -1; x <= 1; ++x)
             for (int y = -1; y <= 1; ++y)

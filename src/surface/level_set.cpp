@@ -526,26 +526,44 @@ std::vector<Surface::Crossing> LevelSet::crossings(double apart) const {
     });
     return result;
 }
-std::vector<Eigen::Vector3i> LevelSet::upright_crossings() const {
-    std::vector<Eigen::Vector3i> result;
-    for (const CrossedEdge& edge : impl_->crossed.edges)
-        if (edge.axis == 2) result.emplace_back(edge.from.x(), edge.from.y(), edge.from.z());
-    return result;
-}
-std::vector<Surface::Diagonal> LevelSet::diagonals() const {
+namespace {
+
+/// What `add(edge, found)` finds at the edges, in their order. `make_add()`: one for each block of them.
+template <typename Found, typename MakeAdd>
+std::vector<Found> gather(const std::vector<CrossedEdge>& edges, const MakeAdd& make_add) {
     constexpr std::size_t kBlock = 16384;
-    const std::vector<CrossedEdge>& edges = impl_->crossed.edges;
-    std::vector<std::vector<Diagonal>> blocks((edges.size() + kBlock - 1) / kBlock);
+    std::vector<std::vector<Found>> blocks((edges.size() + kBlock - 1) / kBlock);
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
-        NodeValues nodes(impl_->grid->constTree());
+        auto add = make_add();
         for (std::size_t e = block * kBlock; e < std::min(edges.size(), (block + 1) * kBlock); ++e)
-            for (int other = edges[e].axis + 1; other < 3; ++other)
-                if (const auto diagonal = diagonal_beyond(edges[e], other, nodes, impl_->map))
-                    blocks[block].push_back(*diagonal);
+            add(edges[e], blocks[block]);
     });
-    std::vector<Diagonal> result;
+    std::size_t count = 0;
+    for (const auto& block : blocks) count += block.size();
+    std::vector<Found> result;
+    result.reserve(count);
     for (const auto& block : blocks) result.insert(result.end(), block.begin(), block.end());
     return result;
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3i> LevelSet::upright_crossings() const {
+    return gather<Eigen::Vector3i>(impl_->crossed.edges, [] {
+        return [](const CrossedEdge& edge, std::vector<Eigen::Vector3i>& found) {
+            if (edge.axis == 2) found.emplace_back(edge.from.x(), edge.from.y(), edge.from.z());
+        };
+    });
+}
+std::vector<Surface::Diagonal> LevelSet::diagonals() const {
+    return gather<Diagonal>(impl_->crossed.edges, [this] {
+        return [this, nodes = NodeValues(impl_->grid->constTree())](const CrossedEdge& edge,
+                                                                    std::vector<Diagonal>& found) mutable {
+            for (int other = edge.axis + 1; other < 3; ++other)
+                if (const auto diagonal = diagonal_beyond(edge, other, nodes, impl_->map))
+                    found.push_back(*diagonal);
+        };
+    });
 }
 bool LevelSet::empty() const {
     return impl_->crossed.edges.empty();

@@ -21,16 +21,44 @@ public:
     LatticeLayers() = default;
     explicit LatticeLayers(const std::vector<Item>& items) {
         if (items.empty()) return;
-        const auto [low, high] = std::minmax_element(items.begin(), items.end(),
-                                                     [](const Item& a, const Item& b) { return a.x < b.x; });
-        low_x_ = low->x;
-        first_.assign(static_cast<std::size_t>(high->x - low_x_) + 2, 0);
-        for (const Item& item : items) ++first_[item.x - low_x_ + 1];
-        for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
-        std::vector<std::size_t> end(first_.begin(), first_.end() - 1);
+        constexpr std::size_t kBlock = 65536;
+        const std::size_t blocks = (items.size() + kBlock - 1) / kBlock;
+        const auto for_each_block = [&](const auto& body) {
+            tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t b) {
+                body(b, items.begin() + static_cast<std::ptrdiff_t>(b * kBlock),
+                     items.begin() + static_cast<std::ptrdiff_t>(std::min(items.size(), (b + 1) * kBlock)));
+            });
+        };
+        std::vector<std::pair<int, int>> ranges(blocks);
+        for_each_block([&](std::size_t b, auto from, auto to) {
+            const auto [low, high] =
+                std::minmax_element(from, to, [](const Item& p, const Item& q) { return p.x < q.x; });
+            ranges[b] = {low->x, high->x};
+        });
+        int high_x = ranges[0].second;
+        low_x_ = ranges[0].first;
+        for (const auto& [low, high] : ranges) {
+            low_x_ = std::min(low_x_, low);
+            high_x = std::max(high_x, high);
+        }
+        const auto layers = static_cast<std::size_t>(high_x - low_x_) + 1;
+        std::vector<std::vector<std::size_t>> next(blocks);  // at first the count of each layer
+        for_each_block([&](std::size_t b, auto from, auto to) {
+            next[b].assign(layers, 0);
+            for (; from != to; ++from) ++next[b][from->x - low_x_];
+        });
+        first_.assign(layers + 1, 0);
+        std::size_t at = 0;
+        for (std::size_t layer = 0; layer < layers; ++layer) {
+            first_[layer] = at;
+            for (auto& of_block : next) at += std::exchange(of_block[layer], at);
+        }
+        first_[layers] = at;
         items_.resize(items.size());
-        for (const Item& item : items) items_[end[item.x - low_x_]++] = item;
-        tbb::parallel_for(std::size_t{0}, first_.size() - 1, [&](std::size_t i) {
+        for_each_block([&](std::size_t b, auto from, auto to) {
+            for (; from != to; ++from) items_[next[b][from->x - low_x_]++] = *from;
+        });
+        tbb::parallel_for(std::size_t{0}, layers, [&](std::size_t i) {
             sort_layer(items_.data() + first_[i], items_.data() + first_[i + 1]);
         });
     }
