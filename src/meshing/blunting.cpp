@@ -11,9 +11,8 @@
 namespace isotrack {
 namespace {
 
-constexpr double kSharp = 1.7320508075688772;  // cotangent of 30 degrees
-constexpr double kFacing = 0.5;                // cosine to the surface normal, at least
-constexpr double kOwn = 1.03;                  // of the tolerance: crossings that near are of a triangle
+constexpr double kFacing = 0.5;  // cosine to the surface normal, at least
+constexpr double kOwn = 1.03;    // of the tolerance: crossings that near are of a triangle
 
 Box box_of(const std::vector<Vec3>& points, const Triangle& t) {
     Box box(points[t[0]]);
@@ -151,7 +150,7 @@ bool Blunter::pass() {
     for (std::size_t t = 0; t < triangles_.size(); ++t) {
         const auto& [i, j, k] = triangles_[t];
         if (!open_[i] && !open_[j] && !open_[k]) continue;
-        if (const double s = sharpness(points_[i], points_[j], points_[k]); s > kSharp)
+        if (const double s = sharpness(points_[i], points_[j], points_[k]); s > kSharpnessAt30Degrees)
             sharp.emplace_back(-s, static_cast<int>(t));
     }
     open_.assign(points_.size(), 0);

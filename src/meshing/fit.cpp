@@ -24,8 +24,7 @@ constexpr double kWeight[3] = {54.0, 12.0, 7.0};  // in the middle, on an edge, 
 
 constexpr double kRelaxation = 1.5;   // the shares of the neighbours make each step too short
 constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
-constexpr double kLargestCotangent = 1.7320508075688772;  // of 30 degrees
-constexpr int kHalvings = 2;  // of the steps around a spoilt triangle, before they are taken back
+constexpr int kHalvings = 2;          // of the steps around a spoilt triangle, before they are taken back
 
 /// A triangle's share in the normal equations of its corners.
 struct Shares {
@@ -61,7 +60,7 @@ bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const
     if (area == Vec3::Zero()) return false;
     if (!(area.dot((b_to - a_to).cross(c_to - a_to)) > 0.0)) return true;
     const double after = sharpness(a_to, b_to, c_to);
-    return after > kLargestCotangent && after > sharpness(a, b, c);
+    return after > kSharpnessAt30Degrees && after > sharpness(a, b, c);
 }
 
 }  // namespace

@@ -17,7 +17,6 @@ namespace {
 constexpr int kWays = 8;                              // that are tried from each place
 constexpr double kFirstStep = 0.3, kLastStep = 0.02;  // of the mean edge
 constexpr int kHalvings = 2;                          // of a move that leaves the tolerance
-constexpr double kVerySharp = 3.0777;                 // cotangent of 18 degrees
 
 /// The triangles around a vertex.
 struct Star {
@@ -166,7 +165,7 @@ std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness)
             points[v] = from;
         }
     }
-    return sharpness > kVerySharp ? search(mesh, triangle) : std::nullopt;
+    return sharpness > kSharpnessAt18Degrees ? search(mesh, triangle) : std::nullopt;
 }
 
 }  // namespace isotrack

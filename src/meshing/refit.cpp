@@ -23,7 +23,6 @@ constexpr int kLattice = 3;      // of the samples in a triangle
 constexpr double kGain = 0.9;    // of the error, at most, for a flip to be worth it
 constexpr double kWorth = 0.25;  // of the mean error of two triangles: less is not looked at
 constexpr double kFacing = 0.5;  // cosine to the surface normal, at least
-constexpr double kLargestCotangent = 1.7320508075688772;  // of 30 degrees
 
 /// The third vertex of the triangle with the edge from v to w, and that triangle; -1 without one.
 std::pair<int, int> beyond(int v, int w, const std::vector<Triangle>& triangles, const Corners& corners) {
@@ -54,22 +53,20 @@ public:
     /// Flips what gains most first, and nothing next to it. Returns the triangles.
     std::vector<std::array<int, 2>> pass(const std::vector<char>& movable) {
         const Corners corners(points_.size(), triangles_);
-        const auto concerned = [&](std::size_t t) {
-            const auto& [i, j, k] = triangles_[t];
-            return movable[i] || movable[j] || movable[k];
-        };
+        std::vector<char> concerned;
+        for (const auto& [i, j, k] : triangles_) concerned.push_back(movable[i] || movable[j] || movable[k]);
         std::vector<double> error(triangles_.size(), 0.0);
         for_each_triangle([&](std::size_t t) {
-            if (concerned(t)) error[t] = error_of(triangles_[t], probes_.local()).first;
+            if (concerned[t]) error[t] = error_of(triangles_[t], probes_.local()).first;
         });
         const auto count = std::count_if(error.begin(), error.end(), [](double e) { return e > 0.0; });
         const double worth = 2.0 * kWorth * std::accumulate(error.begin(), error.end(), 0.0) /
                              static_cast<double>(std::max<std::ptrdiff_t>(1, count));
         std::vector<std::array<Flip, 3>> of_triangle(triangles_.size());
         for_each_triangle([&](std::size_t t) {
-            if (!concerned(t)) return;
+            if (!concerned[t]) return;
             for (int k = 0; k < 3; ++k)
-                of_triangle[t][k] = flip_of(static_cast<int>(t), k, corners, error, worth);
+                of_triangle[t][k] = flip_of(static_cast<int>(t), k, corners, concerned, error, worth);
         });
         std::vector<Flip> flips;
         for (const auto& some : of_triangle)
@@ -123,15 +120,16 @@ private:
 
     /// The other diagonal for the edge opposite to corner k, from the side of its lower vertex; without gain
     /// where it may not be.
-    Flip flip_of(int t, int k, const Corners& corners, const std::vector<double>& error, double worth) {
+    Flip flip_of(int t, int k, const Corners& corners, const std::vector<char>& concerned,
+                 const std::vector<double>& error, double worth) {
         const Triangle& old = triangles_[t];
         const int a = old[k], b = old[(k + 1) % 3], c = old[(k + 2) % 3];
         if (b > c) return {};
         const auto [d, other] = beyond(c, b, triangles_, corners);
-        if (d < 0 || d == a || error[t] + error[other] < worth) return {};
+        if (d < 0 || d == a || !concerned[other] || error[t] + error[other] < worth) return {};
         const std::array<Triangle, 2> after = {{{a, b, d}, {a, d, c}}};
         const double blunt_enough =
-            std::max({kLargestCotangent, sharpness_of(old), sharpness_of(triangles_[other])});
+            std::max({kSharpnessAt30Degrees, sharpness_of(old), sharpness_of(triangles_[other])});
         if (!(std::max(sharpness_of(after[0]), sharpness_of(after[1])) <= blunt_enough)) return {};
         if (is_edge(a, d, corners)) return {};
         Surface::Probe& probe = probes_.local();

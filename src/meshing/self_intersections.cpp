@@ -196,10 +196,11 @@ bool any_cross(const std::vector<Vec3>& points, const std::vector<Triangle>& som
     for (auto t = some.begin(); t != some.end(); ++t) {
         if (!area(*t)) continue;
         const Box box = box_of(*t);
-        const auto meets = [&](const Triangle& other) {
+        const auto is_crossed_by = [&](const Triangle& other) {
             return box.intersects(box_of(other)) && area(other) && cross(points, *t, other);
         };
-        if (std::any_of(t + 1, some.end(), meets) || std::any_of(others.begin(), others.end(), meets))
+        if (std::any_of(t + 1, some.end(), is_crossed_by) ||
+            std::any_of(others.begin(), others.end(), is_crossed_by))
             return true;
     }
     return false;

@@ -140,12 +140,13 @@ std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
     const std::size_t before = particles_.size();
     if (shortages.empty() || before >= most_) return 0;
     first_of_call_ = static_cast<int>(before);
+    widest_of_call_ = 0.0;
     for (; in_grid_ < before; ++in_grid_)
         grid_.insert(particles_.position[in_grid_], static_cast<int>(in_grid_));
     std::vector<char> surrounded(before, 0);
     for (const Shortage& s : shortages) {
         const double wanted = std::max(s.spacing, min_spacing_);
-        const int there = add(s.place, wanted);
+        const int there = add_or_nearest(s.place, wanted);
         if (there < 0 || there >= first_of_call_ || surrounded[there]) continue;
         surrounded[there] = 1;
         const double h = kShrink * std::min(wanted, particles_.spacing[there]);
@@ -156,13 +157,13 @@ std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
         const double turn = kGoldenAngle * static_cast<double>(particles_.size());  // rings do not line up
         for (int k = 0; k < kAround; ++k) {
             const double angle = turn + 2.0 * kPi * k / kAround;
-            add(p + h * (std::cos(angle) * a + std::sin(angle) * b), h);
+            add_or_nearest(p + h * (std::cos(angle) * a + std::sin(angle) * b), h);
         }
     }
     return particles_.size() - before;
 }
 
-int Densifier::add(const Vec3& place, double h) {
+int Densifier::add_or_nearest(const Vec3& place, double h) {
     constexpr double kApart = 0.7, kFar = 10.0;
     constexpr double kFarthest = 8.0;  // resolutions
     int nearest = -1;
@@ -172,9 +173,10 @@ int Densifier::add(const Vec3& place, double h) {
     const Vec3 p = to_float_precision(*projected), n = probe_->normal(p);
     const double apart = kApart * h,
                  far = std::max(apart, std::min(kFar * h, kFarthest * surface_.resolution()));
+    const double looked_at = std::max(far, kApart * widest_of_call_);
     double least = far * far;
     bool taken = false;
-    grid_.for_each_within(p, far, [&](int i, double d2) {
+    grid_.for_each_within(p, looked_at, [&](int i, double d2) {
         if (!(particles_.normal[i].dot(n) > 0.0)) return;
         const double own = kApart * particles_.spacing[i];
         taken = taken || (i >= first_of_call_ && d2 < own * own);
@@ -183,11 +185,12 @@ int Densifier::add(const Vec3& place, double h) {
         nearest = i;
     });
     const double distance = std::sqrt(least);
-    if (taken || (nearest >= 0 && distance < std::min(apart, kApart * particles_.spacing[nearest])))
-        return nearest;
+    if (taken) return -1;
+    if (nearest >= 0 && distance < std::min(apart, kApart * particles_.spacing[nearest])) return nearest;
     grid_.insert(p, static_cast<int>(in_grid_++));
     const double spacing = distance < apart ? distance / kApart : std::max(distance, h);
     particles_.add(p, n, std::max(spacing, min_spacing_), next_id_++);
+    widest_of_call_ = std::max(widest_of_call_, particles_.spacing.back());
     return -1;
 }
 

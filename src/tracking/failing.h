@@ -26,9 +26,8 @@ inline bool angles_matter(const Particles& particles, const Triangle& corner, do
 
 /// Whether its particles make it too sharp, where that matters.
 inline bool is_needle(const Particles& particles, const Triangle& corner, double resolution) {
-    constexpr double kLargestCotangent = 2.4751;  // of 22 degrees
     const auto& at = particles.position;
-    return sharpness(at[corner[0]], at[corner[1]], at[corner[2]]) > kLargestCotangent &&
+    return sharpness(at[corner[0]], at[corner[1]], at[corner[2]]) > kSharpnessAt22Degrees &&
            angles_matter(particles, corner, resolution);
 }
 

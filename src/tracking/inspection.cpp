@@ -19,7 +19,6 @@ constexpr double kFaultReach = 1.5;  // resolutions
 constexpr double kMissedSpacing = 0.75;                    // resolutions
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
 constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
-constexpr double kLargestFittedCotangent = 3.0777;  // of 18 degrees
 
 struct Corners {
     Triangle particle;
@@ -36,11 +35,11 @@ Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
 }
 
 /// After the fit, too.
-bool is_needle(const FrameMesh& mesh, const Particles& particles, std::size_t triangle,
-               const Triangle& corner, double resolution) {
+bool is_needle_even_fitted(const FrameMesh& mesh, const Particles& particles, std::size_t triangle,
+                           const Triangle& corner, double resolution) {
     const auto& [i, j, k] = mesh.carved.triangles[triangle];
     return is_needle(particles, corner, resolution) ||
-           (sharpness(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]) > kLargestFittedCotangent &&
+           (sharpness(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]) > kSharpnessAt18Degrees &&
             angles_matter(particles, corner, resolution));
 }
 
@@ -107,8 +106,8 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
     const double cutoff = kLostAt * limits_.tolerance;
     const std::vector<std::size_t> missed_before = std::move(missed_);  // ascending
     missed_.clear();
-    if (distances_.empty() ||
-        kMany * static_cast<double>(facets_.size()) < static_cast<double>(went_.size())) {
+    const auto changed = static_cast<double>(std::max(came_.size(), went_.size()));
+    if (distances_.empty() || changed > kMany * static_cast<double>(facets_.size())) {
         distances_ = crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff);
     } else {
         // What was nearest to a triangle that went is to be measured again; what is nearer to one that came
@@ -117,7 +116,7 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
         constexpr double kUnknown = -1.0;
         const auto for_each_near = [&](const Facet& facet, const auto& body) {
             const auto& [a, b, c] = facet.corner;
-            const Vec3 reach = Vec3::Constant(reach_), low = a.cwiseMin(b).cwiseMin(c).cast<double>(),
+            const Vec3 reach = Vec3::Constant(reach_ + same), low = a.cwiseMin(b).cwiseMin(c).cast<double>(),
                        high = a.cwiseMax(b).cwiseMax(c).cast<double>();
             const FacingTriangle triangle(a.cast<double>(), b.cast<double>(), c.cast<double>());
             crossings_.for_each_in(Box(low - reach, high + reach), [&](std::size_t i) {
@@ -255,8 +254,8 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, fails.size(), 1024), [&](const auto& range) {
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
             const auto [corner, whole] = corners_of(carved, t);
-            fails[t] =
-                is_too_far(t) || (whole && is_needle(mesh, particles, t, corner, surface.resolution()));
+            fails[t] = is_too_far(t) ||
+                       (whole && is_needle_even_fitted(mesh, particles, t, corner, surface.resolution()));
         }
     });
     for (std::size_t t = 0; t < fails.size(); ++t) {

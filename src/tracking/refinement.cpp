@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 
 #include "isotrack/meshing/certify.h"
 #include "tracking/failing.h"

@@ -1,14 +1,12 @@
 // Delaunay refinement of the boundary between inside and outside cells, where it changes.
 #pragma once
 
-#include <cstddef>
-#include <vector>
-
 #include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/meshing/convection.h"
 #include "isotrack/sampling/particles.h"
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/sizing.h"
+#include "isotrack/surface/surface.h"
 
 namespace isotrack {
 

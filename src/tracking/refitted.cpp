@@ -1,5 +1,7 @@
 #include "tracking/refitted.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <numeric>
@@ -14,7 +16,6 @@
 namespace isotrack {
 namespace {
 
-constexpr double kLargestCotangent = 1.7320508075688772;  // of 30 degrees
 constexpr double kPoor = 0.1;   // of the tolerance: a triangle with a larger RMS error is worth the time
 constexpr double kReach = 1.5;  // tolerances: a triangle that near may have stood for a crossing
 
@@ -51,7 +52,7 @@ public:
     /// made; they are held against the sum of those they stand for.
     bool is_spoilt(std::size_t t) const {
         Vec3 before = normal_[t];
-        double sharpest = std::max(kLargestCotangent, sharpest_[t]);
+        double sharpest = std::max(kSharpnessAt30Degrees, sharpest_[t]);
         for (std::size_t u = next_[t]; u != t; u = next_[u]) {
             before += normal_[u];
             sharpest = std::max(sharpest, sharpest_[u]);
@@ -154,15 +155,20 @@ Inspection refit_within(FrameMesh& mesh, const Inspection& before, const std::ve
     for (;;) {
         Inspection inspection = inspector.inspect_both_ways(mesh);
         std::vector<char> bad(mesh.carved.triangles.size(), 0);
-        for (std::size_t t = 0; t < bad.size(); ++t)
-            bad[t] =
-                refitted.is_changed(t) && (inspection.errors[t].largest > tolerance || refitted.is_spoilt(t));
-        for (const auto& c : inspection.missed) {
-            if (missed_before.count({c.point.x(), c.point.y(), c.point.z()}) > 0) continue;
-            for (std::size_t t = 0; t < bad.size(); ++t) bad[t] = bad[t] || refitted.is_near(t, c.point);
-        }
-        for (const auto& pair : self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}))
-            bad[pair.first] = bad[pair.second] = 1;
+        std::vector<Vec3> newly_missed;
+        for (const auto& c : inspection.missed)
+            if (missed_before.count({c.point.x(), c.point.y(), c.point.z()}) == 0)
+                newly_missed.push_back(c.point);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bad.size(), 1024), [&](const auto& range) {
+            for (std::size_t t = range.begin(); t < range.end(); ++t)
+                bad[t] = refitted.is_changed(t) &&
+                         (inspection.errors[t].largest > std::max(tolerance, before.errors[t].largest) ||
+                          refitted.is_spoilt(t) ||
+                          std::any_of(newly_missed.begin(), newly_missed.end(),
+                                      [&](const Vec3& place) { return refitted.is_near(t, place); }));
+        });
+        for (const auto& [t, u] : self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}))
+            if (refitted.is_changed(t) || refitted.is_changed(u)) bad[t] = bad[u] = 1;  // not there before
         if (std::find(bad.begin(), bad.end(), 1) == bad.end() || !refitted.undo(std::move(bad)))
             return inspection;
     }

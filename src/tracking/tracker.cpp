@@ -62,7 +62,7 @@ constexpr double kMostPerCrossing = 0.5;
 constexpr std::size_t kMostAnyway = 1000;
 constexpr double kFitWideExponent = 0.5;
 constexpr int kBluntRounds = 3, kBluntPasses = 12;
-constexpr double kBluntShare = 0.96;    // of the tolerance, for the triangles they or the refit change
+constexpr double kChangedShare = 0.96;  // of the tolerance, for the triangles they or the refit change
 constexpr double kAngleFloor = 2.0;     // details: sharp edges are as round as they make them
 constexpr double kLeastSpacing = 5e-4;  // resolutions: a single node inside may leave no more than that
 
@@ -186,7 +186,7 @@ struct Work {
     void refit() {
         const StageTimer timer(frame.seconds, "fit");
         inspection =
-            refit_within(mesh, inspection, movable(), surface, kBluntShare * limits.tolerance, *inspector);
+            refit_within(mesh, inspection, movable(), surface, kChangedShare * limits.tolerance, *inspector);
     }
 
     /// Makes sharp triangles blunter where the mesh goes on reaching all it reached. The particles stay where
@@ -194,7 +194,7 @@ struct Work {
     void blunt() {
         const StageTimer timer(frame.seconds, "blunt");
         Blunter blunter(mesh.vertices, mesh.carved.triangles, movable(), surface, *crossings,
-                        kBluntShare * limits.tolerance);
+                        kChangedShare * limits.tolerance);
         const auto missed = [&] {
             std::vector<std::array<double, 3>> places;
             for (const auto& c : inspection.missed) places.push_back({c.point.x(), c.point.y(), c.point.z()});
@@ -388,7 +388,7 @@ struct Tracker::Impl {
         return mesh;
     }
 
-    Densifier densifier(const Surface& surface, const SizingLimits& l, std::size_t crossings) {
+    Densifier make_densifier(const Surface& surface, const SizingLimits& l, std::size_t crossings) {
         const double finer = std::max(1.0, 0.5 * surface.resolution() / l.tolerance);
         const auto most =
             kMostAnyway + static_cast<std::size_t>(kMostPerCrossing * finer * static_cast<double>(crossings));
@@ -558,18 +558,19 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         if (options.method == Method::Paper) break;
         inspection = mending == 0 ? inspector->inspect(mesh) : inspector->inspect_both_ways(mesh);
         memory.evidence.error = errors_at_particles(mesh, inspection.errors, particles.size());
-        Densifier once = densifier(surface, l, crossing_count);
+        Densifier once = make_densifier(surface, l, crossing_count);
         added = mend(mesh, inspection, surface, l, once);
         if (mending == kMostMendings ||
             static_cast<double>(added) < kFew * static_cast<double>(particles.size()))
             break;
         make_room(surface, frame);
     }
-    // A fitted mesh fails elsewhere than its particles do.
+    // A fitted mesh fails elsewhere than its particles do; of a DT built anew all cells are new.
     const bool refines = !options.fit && options.method == Method::Tolerance &&
-                         options.reconstruction == Reconstruction::Guided;
+                         options.reconstruction == Reconstruction::Guided &&
+                         options.delaunay != UpdateStrategy::Rebuild;
     // The topology, which takes longer to look at, is looked at when all else passes.
-    Densifier densifier = this->densifier(surface, l, crossing_count);
+    Densifier densifier = make_densifier(surface, l, crossing_count);
     for (int round = 0;; ++round) {
         if (round > 0 || added > 0) {
             tetrahedralise(false, seconds);

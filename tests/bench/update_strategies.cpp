@@ -393,7 +393,8 @@ int main(int argc, char** argv) {
             for (const std::string& sequence : sequences)
                 for (const double tolerance : tolerances) follow_sequence(sequence, tolerance, most_moves);
         }
-        fmt::print("\nMove and lazy take minutes where more than {} particles move: left out.\n", most_moves);
+        fmt::print("\nWhere more than {} particles move, move and lazy take minutes and are left out.\n",
+                   most_moves);
     } catch (const std::exception& error) {
         fmt::print(stderr, "{}\n", error.what());
         return 1;

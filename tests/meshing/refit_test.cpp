@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <random>
 #include <set>
 #include <utility>
 #include <vector>
@@ -148,6 +149,22 @@ TEST_F(CutCube, KeepsWhatIsNotMovable) {
     EXPECT_TRUE(flips.empty());
     EXPECT_EQ(after.points, before.points);
     EXPECT_EQ(after.triangles, before.triangles);
+}
+
+TEST_F(CutCube, KeepsTrianglesWithoutAMovableVertex) {
+    // At random, so that many an edge has such a triangle on one side alone.
+    std::mt19937 random(1);
+    std::vector<char> movable;
+    for (std::size_t v = 0; v < before.points.size(); ++v) movable.push_back(random() % 4 == 0);
+    after = before;
+    ASSERT_FALSE(refit(after.points, after.triangles, *box, kTolerance, movable).empty());
+    for (std::size_t t = 0; t < before.triangles.size(); ++t) {
+        const auto& [i, j, k] = before.triangles[t];
+        if (movable[i] || movable[j] || movable[k]) continue;
+        EXPECT_EQ(after.triangles[t], before.triangles[t]);
+    }
+    for (std::size_t v = 0; v < before.points.size(); ++v)
+        EXPECT_TRUE(movable[v] || after.points[v] == before.points[v]);
 }
 
 TEST_F(CutCube, MakesNoEdgeThatItHadAndFlipsCanBeTakenBackAlone) {

@@ -39,7 +39,7 @@ struct Shortage {
     double least = 0.0;  ///< Particles around it get no denser than this.
 };
 
-/// Adds particles where the mesh fails, call by call. Between calls the particles may only be added to.
+/// Adds particles where the mesh fails, call by call. Between calls no particle may be moved or removed.
 class Densifier {
 public:
     /// There will be no more than `most` particles. All references must outlive it.
@@ -47,19 +47,19 @@ public:
               Id& next_id);
 
     /// Adds particles at the projections of `shortages`, in their order, at places that floats can hold: at
-    /// least 0.7 of the wanted spacing from particles that face the same way. A particle that is nearer is
-    /// surrounded instead: its spacing becomes 0.6 of the smaller of its own and the wanted one, down to
-    /// `min_spacing` and `least`, and six more are added around it at that distance, so that repeated calls
-    /// get denser. Where there is room for more than the wanted spacing a particle takes the distance to the
-    /// nearest for its own (up to ten times the wanted one and eight resolutions), and no other of the same
-    /// call is added within 0.7 of that: it is seen first what the one has mended. Returns how many were
-    /// added: 0 means that nothing more can be done.
+    /// least 0.7 of the wanted spacing, or of that of the nearest particle, from those that face the same
+    /// way. A particle that was there before and is nearer is surrounded instead: its spacing becomes 0.6 of
+    /// the smaller of its own and the wanted one, down to `min_spacing` and `least`, and six more are added
+    /// around it at that distance, so that repeated calls get denser. Where there is room for more than the
+    /// wanted spacing a particle takes the distance to the nearest for its own (up to ten times the wanted
+    /// one and eight resolutions), and no other of the same call is added within 0.7 of that: it is seen
+    /// first what the one has mended. Returns how many were added: 0 means that nothing more can be done.
     std::size_t add(const std::vector<Shortage>& shortages);
 
 private:
-    /// Adds a particle at the projection of `place`, at most `h` apart from the others, or returns the one
-    /// that is already there.
-    int add(const Vec3& place, double h);
+    /// Adds a particle at the projection of `place` and returns -1, or the one that is already there; neither
+    /// where one of this call mends enough.
+    int add_or_nearest(const Vec3& place, double h);
 
     Particles& particles_;
     const Surface& surface_;
@@ -69,7 +69,8 @@ private:
     std::unique_ptr<Surface::Probe> probe_;
     PointGrid grid_;
     std::size_t in_grid_ = 0;
-    int first_of_call_ = 0;  // of the particles added
+    int first_of_call_ = 0;        // of the particles added
+    double widest_of_call_ = 0.0;  // of their spacings
 };
 
 }  // namespace isotrack

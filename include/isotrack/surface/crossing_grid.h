@@ -17,7 +17,7 @@ public:
     /// Those of `surface.crossings(apart)`.
     explicit CrossingGrid(const Surface& surface, double apart = 0.0)
         : CrossingGrid(surface.crossings(apart), std::max(surface.resolution(), apart)) {}
-    /// `spacing` of the crossings, world units.
+    /// `spacing` of the crossings, world units. Few different directions, as those of a lattice.
     CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing);
 
     std::size_t size() const { return entries_.size(); }
