@@ -8,14 +8,7 @@ namespace isotrack {
 std::optional<Blunting> flip(BluntedMesh& mesh, int triangle, double sharpness) {
     const auto& points = mesh.points;
     auto& triangles = mesh.triangles;
-    /// The third vertex of the triangle with the edge from v to w, and that triangle.
-    const auto beyond = [&](int v, int w) {
-        for (int e = mesh.corners.first[v]; e < mesh.corners.first[v + 1]; ++e) {
-            const int t = mesh.corners.corner[e] / 3, k = mesh.corners.corner[e] % 3;
-            if (triangles[t][(k + 1) % 3] == w) return std::make_pair(triangles[t][(k + 2) % 3], t);
-        }
-        return std::make_pair(-1, -1);
-    };
+    const auto beyond = [&](int v, int w) { return mesh.corners.beyond(v, w, triangles); };
     const Triangle& old = triangles[triangle];
     int k = 0;
     double longest = 0.0;

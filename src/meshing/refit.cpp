@@ -24,15 +24,6 @@ constexpr double kGain = 0.9;    // of the error, at most, for a flip to be wort
 constexpr double kWorth = 0.25;  // of the mean error of two triangles: less is not looked at
 constexpr double kFacing = 0.5;  // cosine to the surface normal, at least
 
-/// The third vertex of the triangle with the edge from v to w, and that triangle; -1 without one.
-std::pair<int, int> beyond(int v, int w, const std::vector<Triangle>& triangles, const Corners& corners) {
-    for (int e = corners.first[v]; e < corners.first[v + 1]; ++e) {
-        const int t = corners.corner[e] / 3, k = corners.corner[e] % 3;
-        if (triangles[t][(k + 1) % 3] == w) return {triangles[t][(k + 2) % 3], t};
-    }
-    return {-1, -1};
-}
-
 struct Flip {
     double gain = 0.0;
     std::array<int, 2> triangle{};
@@ -113,7 +104,7 @@ private:
     }
     bool is_edge(int v, int w, const Corners& corners) const {
         const auto has = [&](const std::vector<Triangle>& triangles, const Corners& of) {
-            return beyond(v, w, triangles, of).second >= 0 || beyond(w, v, triangles, of).second >= 0;
+            return of.beyond(v, w, triangles).second >= 0 || of.beyond(w, v, triangles).second >= 0;
         };
         return has(triangles_, corners) || has(at_start_, corners_at_start_);
     }
@@ -125,7 +116,7 @@ private:
         const Triangle& old = triangles_[t];
         const int a = old[k], b = old[(k + 1) % 3], c = old[(k + 2) % 3];
         if (b > c) return {};
-        const auto [d, other] = beyond(c, b, triangles_, corners);
+        const auto [d, other] = corners.beyond(c, b, triangles_);
         if (d < 0 || d == a || !concerned[other] || error[t] + error[other] < worth) return {};
         const std::array<Triangle, 2> after = {{{a, b, d}, {a, d, c}}};
         const double blunt_enough =
