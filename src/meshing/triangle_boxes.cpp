@@ -1,5 +1,6 @@
 #include "meshing/triangle_boxes.h"
 
+#define BOOST_ALLOW_DEPRECATED_HEADERS  // Boost 1.74 includes its own, and the compiler would say so
 #include <algorithm>
 #include <boost/geometry/geometries/box.hpp>
 #include <boost/geometry/geometries/point.hpp>
