@@ -1,33 +1,16 @@
 #include "delaunay/living.h"
 
-#include <CGAL/Delaunay_triangulation_3.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Triangulation_cell_base_with_info_3.h>
-#include <CGAL/Triangulation_vertex_base_with_info_3.h>
-
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstdint>
+#include <numeric>
 #include <utility>
+
+#include "delaunay/filters.h"
 
 namespace isotrack {
 namespace {
-
-struct Slot {
-    int index = -1;  // of the flat copy; a new cell has none
-};
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using VertexBase = CGAL::Triangulation_vertex_base_with_info_3<int, Kernel>;
-using CellBase =
-    CGAL::Triangulation_cell_base_with_info_3<Slot, Kernel, CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
-using Delaunay =
-    CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
-using Cell = Delaunay::Cell_handle;
-using Vertex = Delaunay::Vertex_handle;
-
-Kernel::Point_3 to_cgal(const Vec3& p) {
-    return {p.x(), p.y(), p.z()};
-}
 
 /// Counts a call and its time.
 class Clocked {
@@ -44,278 +27,278 @@ private:
     std::chrono::steady_clock::time_point start_;
 };
 
+/// A facet of a cell by its vertices, from the smallest number on, counter-clockwise seen from outside.
+using FacetKey = std::array<int, 3>;
+FacetKey facet_of(const std::array<int, 4>& v, int k) {
+    const auto& f = Tetrahedra::kFacet[k];
+    FacetKey key{v[f[0]], v[f[1]], v[f[2]]};
+    std::rotate(key.begin(), std::min_element(key.begin(), key.end()), key.end());
+    return key;
+}
+
 }  // namespace
 
-struct LivingDelaunay::Impl {
-    Delaunay dt;
-    UpdateProfile profile;
-    std::vector<Vertex> vertex;  // by number
-    Tetrahedra flat;
-    bool mirrored = false;  // `flat` is that of `dt`
-    std::vector<int> free_slots, changed;
-    std::vector<Cell> cells, fresh;
-    std::vector<std::pair<Cell, int>> rim;
-
-    int number_of(Vertex v) const { return dt.is_infinite(v) ? Tetrahedra::kInfinite : v->info(); }
-
-    void write(Cell cell) {
-        const int s = cell->info().index;
-        for (int k = 0; k < 4; ++k) {
-            flat.vertices[s][k] = number_of(cell->vertex(k));
-            flat.neighbours[s][k] = cell->neighbor(k)->info().index;
-        }
-    }
-
-    void mirror() {
-        flat.vertices.clear();
-        flat.neighbours.clear();
-        free_slots.clear();
-        mirrored = true;
-        changed.clear();
-        if (dt.dimension() < 3) return;
-        int count = 0;
-        for (auto cell = dt.all_cells_begin(); cell != dt.all_cells_end(); ++cell)
-            cell->info().index = count++;
-        flat.vertices.resize(count);
-        flat.neighbours.resize(count);
-        changed.resize(count);
-        for (auto cell = dt.all_cells_begin(); cell != dt.all_cells_end(); ++cell) {
-            changed[cell->info().index] = cell->info().index;
-            write(cell);
-        }
-    }
-
-    void free_slot(Cell cell) {
-        const int s = cell->info().index;
-        flat.vertices[s].fill(Tetrahedra::kInfinite);
-        flat.neighbours[s].fill(s);
-        free_slots.push_back(s);
-        changed.push_back(s);
-    }
-
-    /// Cells are the most of what a DT holds: twice the room for a few more would be too much.
-    void add_slot() {
-        constexpr std::size_t kSlack = 16;  // of as many
-        if (flat.size() == flat.vertices.capacity()) {
-            flat.vertices.reserve(flat.size() + flat.size() / kSlack + kSlack);
-            flat.neighbours.reserve(flat.vertices.capacity());
-        }
-        flat.vertices.emplace_back();
-        flat.neighbours.emplace_back();
-    }
-
-    /// Gives every cell in `fresh` a slot and writes it and its neighbours.
-    void adopt() {
-        for (const Cell& cell : fresh) {
-            if (free_slots.empty()) {
-                cell->info().index = static_cast<int>(flat.size());
-                add_slot();
-            } else {
-                cell->info().index = free_slots.back();
-                free_slots.pop_back();
-            }
-        }
-        for (const Cell& cell : fresh) {
-            write(cell);
-            changed.push_back(cell->info().index);
-            for (int k = 0; k < 4; ++k) {
-                const Cell other = cell->neighbor(k);
-                flat.neighbours[other->info().index][other->index(cell)] = cell->info().index;
-            }
-        }
-    }
-
-    Vertex insert(const Vec3& at, Vertex near) {
-        const auto p = to_cgal(at);
-        Delaunay::Locate_type type;
-        int i, j;
-        Cell start;
-        {
-            const Clocked clock(profile.locate);
-            start = dt.locate(p, type, i, j, near == Vertex() ? Cell() : near->cell());
-        }
-        if (type == Delaunay::VERTEX) return Vertex();
-        const Clocked clock(profile.insert);
-        if (dt.dimension() < 3 || !mirrored || type == Delaunay::OUTSIDE_AFFINE_HULL) {
-            mirrored = false;
-            return dt.insert(p, type, start, i, j);
-        }
-        cells.clear();
-        dt.find_conflicts(p, start, CGAL::Oneset_iterator<Delaunay::Facet>(facet), std::back_inserter(cells));
-        for (const Cell& cell : cells) free_slot(cell);
-        const Vertex v = dt.insert_in_hole(p, cells.begin(), cells.end(), facet.first, facet.second);
-        fresh.clear();
-        dt.incident_cells(v, std::back_inserter(fresh));
-        return v;
-    }
-    Delaunay::Facet facet;
-
-    void remove(Vertex v) {
-        const Clocked clock(profile.remove);
-        if (dt.dimension() < 3 || !mirrored) {
-            mirrored = false;
-            dt.remove(v);
-            return;
-        }
-        cells.clear();
-        rim.clear();
-        dt.incident_cells(v, std::back_inserter(cells));
-        for (const Cell& cell : cells) {
-            const Cell other = cell->neighbor(cell->index(v));
-            rim.emplace_back(other, other->index(cell));
-        }
-        for (const Cell& cell : cells) free_slot(cell);
-        dt.remove(v);
-        if (dt.dimension() < 3) {
-            mirrored = false;
-            return;
-        }
-        // The new cells fill the hole behind the rim; they are those without a slot.
-        constexpr int kFound = -2;
-        fresh.clear();
-        const auto find = [&](Cell cell) {
-            if (cell->info().index != -1) return;
-            cell->info().index = kFound;
-            fresh.push_back(cell);
-        };
-        for (const auto& [cell, k] : rim) find(cell->neighbor(k));
-        for (std::size_t f = 0; f < fresh.size(); ++f)
-            for (int k = 0; k < 4; ++k) find(fresh[f]->neighbor(k));
-        adopt();
-    }
-};
-
-LivingDelaunay::LivingDelaunay() : impl_(std::make_unique<Impl>()) {}
-LivingDelaunay::~LivingDelaunay() = default;
-
 void LivingDelaunay::assign(const std::vector<Vec3>& points, const std::vector<char>& there) {
-    const Clocked clock(impl_->profile.build);
-    std::vector<std::pair<Kernel::Point_3, int>> numbered;
-    numbered.reserve(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i)
-        if (there.empty() || there[i]) numbered.emplace_back(to_cgal(points[i]), static_cast<int>(i));
-    impl_->dt.clear();
-    impl_->dt.insert(numbered.begin(), numbered.end());
-    impl_->vertex.assign(points.size(), Vertex());
-    for (auto v = impl_->dt.finite_vertices_begin(); v != impl_->dt.finite_vertices_end(); ++v)
-        impl_->vertex[v->info()] = v;
-    impl_->mirrored = false;
+    const Clocked clock(profile_.build);
+    dt_.points = points;
+    there_ = there.empty() ? std::vector<char>(points.size(), 1) : there;
+    rebuild();
+}
+
+void LivingDelaunay::rebuild() {
+    std::vector<int> numbers;
+    for (std::size_t v = 0; v < there_.size(); ++v)
+        if (there_[v]) numbers.push_back(static_cast<int>(v));
+    dt_.build(numbers);
+    size_ = numbers.size();
+    std::fill(there_.begin(), there_.end(), 0);
+    for (const int v : numbers) there_[v] = 1;
+    a_cell_.assign(there_.size(), -1);
+    const Tetrahedra& cells = dt_.cells();
+    for (std::size_t c = 0; c < cells.size(); ++c)
+        for (const int v : cells.vertices[c])
+            if (v >= 0) a_cell_[v] = static_cast<int>(c);
+    recent_ = 0;
+    changed_.resize(cells.size());
+    std::iota(changed_.begin(), changed_.end(), 0);
 }
 
 bool LivingDelaunay::insert(int number, const Vec3& p, int near) {
-    if (number >= static_cast<int>(impl_->vertex.size())) impl_->vertex.resize(number + 1);
-    const Vertex v = impl_->insert(p, near >= 0 ? impl_->vertex[near] : Vertex());
-    impl_->vertex[number] = v;
-    if (v == Vertex()) return false;
-    v->info() = number;
-    if (impl_->mirrored) impl_->adopt();
+    if (number >= static_cast<int>(there_.size())) {
+        dt_.points.resize(number + 1);
+        there_.resize(number + 1, 0);
+        a_cell_.resize(number + 1, -1);
+    }
+    dt_.points[number] = p;
+    if (dt_.empty()) {
+        there_[number] = 1;
+        rebuild();
+        return has(number);
+    }
+    int cell;
+    {
+        const Clocked clock(profile_.locate);
+        cell = dt_.locate(p, near >= 0 ? a_cell_[near] : recent_);
+    }
+    if (dt_.vertex_at(p, cell) >= 0) return false;
+    place(number, cell);
     return true;
 }
 
+/// Makes cells for a number that has a position, located in `cell`.
+void LivingDelaunay::place(int number, int cell) {
+    const Clocked clock(profile_.insert);
+    dt_.insert(number, cell);
+    for (const int slot : dt_.fresh())
+        for (const int v : dt_.cells().vertices[slot])
+            if (v >= 0) a_cell_[v] = slot;
+    changed_.insert(changed_.end(), dt_.fresh().begin(), dt_.fresh().end());
+    changed_.insert(changed_.end(), dt_.freed().begin(), dt_.freed().end());
+    recent_ = dt_.fresh().front();
+    there_[number] = 1;
+    ++size_;
+}
+
 void LivingDelaunay::remove(int number) {
-    impl_->remove(impl_->vertex[number]);
-    impl_->vertex[number] = Vertex();
+    const Clocked clock(profile_.remove);
+    there_[number] = 0;
+    --size_;
+    if (!dt_.empty() && !fill_star(number)) rebuild();
+}
+
+/// Fills what the cells around a vertex leave with cells of the DT of their other vertices (Devillers and
+/// Teillaud 2011). False, and nothing done, when these span no volume.
+bool LivingDelaunay::fill_star(int number) {
+    const std::vector<int>& star = star_of(number);
+    Tetrahedra& cells = dt_.slots();
+    std::vector<int> link;
+    for (const int c : star)
+        for (const int v : cells.vertices[c])
+            if (v >= 0 && v != number) link.push_back(v);
+    std::sort(link.begin(), link.end());
+    link.erase(std::unique(link.begin(), link.end()), link.end());
+    hole_.points.clear();
+    for (const int v : link) hole_.points.push_back(dt_.points[v]);
+    std::vector<int> all(link.size());
+    std::iota(all.begin(), all.end(), 0);
+    hole_.build(all);
+    const Tetrahedra& filling = hole_.cells();
+
+    // From outside the star every facet of its rim is found again among those of the filling.
+    struct Entry {
+        FacetKey facet;
+        int link;  // to the cell of the filling that has it
+        bool operator<(const Entry& other) const { return facet < other.facet; }
+    };
+    std::vector<Entry> entries;
+    for (std::size_t c = 0; c < filling.size(); ++c) {
+        std::array<int, 4> v = filling.vertices[c];
+        for (int& w : v)
+            if (w >= 0) w = link[w];
+        for (int k = 0; k < 4; ++k)
+            entries.push_back({facet_of(v, k), Tetrahedra::link(static_cast<int>(c), k)});
+    }
+    std::sort(entries.begin(), entries.end());
+    constexpr int kNone = -1;
+    std::vector<std::array<int, 4>> outside(filling.size(), {kNone, kNone, kNone, kNone});
+    std::vector<int> taken, slot(filling.size(), kNone);
+    for (const int c : star) {
+        const int k = cells.index_of(c, number);
+        const Entry entry{facet_of(cells.vertices[c], k), kNone};
+        const auto found = std::lower_bound(entries.begin(), entries.end(), entry);
+        if (found == entries.end() || found->facet != entry.facet) return false;
+        const int inside = found->link >> 2;
+        outside[inside][found->link & 3] = cells.links[c][k];
+        if (slot[inside] == kNone) taken.push_back(inside);
+        slot[inside] = 0;
+    }
+    for (std::size_t i = 0; i < taken.size(); ++i)
+        for (int k = 0; k < 4; ++k) {
+            const int next = filling.neighbour(taken[i], k);
+            if (outside[taken[i]][k] != kNone || slot[next] != kNone) continue;
+            taken.push_back(next);
+            slot[next] = 0;
+        }
+
+    changed_.insert(changed_.end(), star.begin(), star.end());
+    for (const int c : star) dt_.free_slot(c);
+    for (const int c : taken) slot[c] = dt_.new_slot();
+    recent_ = slot[taken.front()];
+    for (const int c : taken) {
+        const int s = slot[c];
+        changed_.push_back(s);
+        for (int k = 0; k < 4; ++k) {
+            const int v = filling.vertices[c][k];
+            cells.vertices[s][k] = v < 0 ? Tetrahedra::kInfinite : link[v];
+            if (v >= 0) a_cell_[link[v]] = s;
+            const int out = outside[c][k];
+            if (out == kNone) {
+                cells.links[s][k] =
+                    Tetrahedra::link(slot[filling.neighbour(c, k)], filling.mirror_index(c, k));
+            } else {
+                cells.links[s][k] = out;
+                cells.links[out >> 2][out & 3] = Tetrahedra::link(s, k);
+            }
+        }
+    }
+    return true;
 }
 
 void LivingDelaunay::relocate(int number, const Vec3& p) {
-    ++impl_->profile.relocated;
-    const Vertex old = impl_->vertex[number];
-    const Vertex v = impl_->insert(p, old);
-    if (v != Vertex()) {
-        v->info() = number;
-        if (impl_->mirrored) impl_->adopt();
+    ++profile_.relocated;
+    if (dt_.empty()) {
+        dt_.points[number] = p;
+        rebuild();
+        return;
     }
-    impl_->remove(old);
-    impl_->vertex[number] = v;
+    int cell;
+    {
+        const Clocked clock(profile_.locate);
+        cell = dt_.locate(p, a_cell_[number]);
+    }
+    const int other = dt_.vertex_at(p, cell);
+    if (other == number) return;
+    if (other >= 0) {
+        remove(number);
+        return;
+    }
+    // Under a number of its own until the old one has gone.
+    const int moved = static_cast<int>(there_.size());
+    dt_.points.push_back(p);
+    there_.push_back(0);
+    a_cell_.push_back(-1);
+    place(moved, cell);
+    remove(number);
+    for (const int c : star_of(moved)) dt_.slots().vertices[c][dt_.cells().index_of(c, moved)] = number;
+    dt_.points[number] = p;
+    there_[number] = 1;
+    a_cell_[number] = a_cell_[moved];
+    dt_.points.pop_back();
+    there_.pop_back();
+    a_cell_.pop_back();
 }
 
 void LivingDelaunay::renumber(const std::vector<int>& to) {
-    std::vector<Vertex> vertex;
-    for (std::size_t i = 0; i < impl_->vertex.size(); ++i) {
-        if (to[i] < 0) continue;
-        vertex.resize(to[i] + 1);
-        vertex[to[i]] = impl_->vertex[i];
-        if (vertex[to[i]] != Vertex()) vertex[to[i]]->info() = to[i];
+    std::size_t count = 0;
+    for (std::size_t v = 0; v < there_.size(); ++v) {
+        if (to[v] < 0) continue;
+        count = to[v] + 1;
+        dt_.points[to[v]] = dt_.points[v];
+        there_[to[v]] = there_[v];
+        a_cell_[to[v]] = a_cell_[v];
     }
-    impl_->vertex.swap(vertex);
-    if (!impl_->mirrored) return;
-    for (auto& cell : impl_->flat.vertices)
+    dt_.points.resize(count);
+    there_.resize(count);
+    a_cell_.resize(count);
+    for (auto& cell : dt_.slots().vertices)
         for (int& v : cell)
             if (v >= 0) v = to[v];
 }
 
-std::size_t LivingDelaunay::size() const {
-    return impl_->dt.number_of_vertices();
-}
-
-bool LivingDelaunay::has(int number) const {
-    return number < static_cast<int>(impl_->vertex.size()) && impl_->vertex[number] != Vertex();
-}
-
-Vec3 LivingDelaunay::position(int number) const {
-    const auto& p = impl_->vertex[number]->point();
-    return {p.x(), p.y(), p.z()};
-}
-
-void LivingDelaunay::set_position(int number, const Vec3& p) {
-    impl_->vertex[number]->set_point(to_cgal(p));
+/// The cells around a vertex; valid until the next call.
+const std::vector<int>& LivingDelaunay::star_of(int number) const {
+    const Tetrahedra& cells = dt_.cells();
+    star_.clear();
+    if (cells.size() == 0) return star_;
+    in_star_.resize(cells.size(), 0);
+    star_.push_back(a_cell_[number]);
+    in_star_[star_.front()] = 1;
+    for (std::size_t i = 0; i < star_.size(); ++i)
+        for (int k = 0; k < 4; ++k) {
+            const int other = cells.neighbour(star_[i], k);
+            if (cells.vertices[star_[i]][k] == number || in_star_[other]) continue;
+            in_star_[other] = 1;
+            star_.push_back(other);
+        }
+    for (const int c : star_) in_star_[c] = 0;
+    return star_;
 }
 
 LivingDelaunay::Star LivingDelaunay::star_at(int number, const Vec3& p) {
-    Delaunay& dt = impl_->dt;
-    if (dt.dimension() < 3) return Star::Broken;
-    const Clocked clock(impl_->profile.predicates);
-    const Vertex v = impl_->vertex[number];
-    const auto before = v->point();
-    v->set_point(to_cgal(p));
-    auto& cells = impl_->cells;
-    cells.clear();
-    dt.incident_cells(v, std::back_inserter(cells));
-    Star star = Star::Delaunay;
-    for (const Cell& c : cells)
-        if (!dt.is_infinite(c) &&
-            CGAL::orientation(c->vertex(0)->point(), c->vertex(1)->point(), c->vertex(2)->point(),
-                              c->vertex(3)->point()) != CGAL::POSITIVE) {
-            star = Star::Broken;
-            break;
-        }
+    if (dt_.empty()) return Star::Broken;
+    const Clocked clock(profile_.predicates);
+    const Tetrahedra& cells = dt_.cells();
+    const std::vector<Vec3>& at = dt_.points;
+    const Vec3 before = std::exchange(dt_.points[number], p);
+    const std::vector<int>& star = star_of(number);
+    const auto upright = [&](int c) {
+        const auto& v = cells.vertices[c];
+        return cells.is_infinite(c) || filtered_orientation(at[v[0]], at[v[1]], at[v[2]], at[v[3]]) > 0;
+    };
     // Every facet of the star's cells, the link's among them: neither apex inside the other's sphere. Between
     // two infinite cells that is the convexity of the hull: where it is dented a cell is missing, but all
     // that are there are embedded.
-    for (std::size_t f = 0; f < cells.size() && star == Star::Delaunay; ++f)
-        for (int k = 0; k < 4 && star == Star::Delaunay; ++k) {
-            const Cell c = cells[f], other = c->neighbor(k);
-            const Vertex apex = other->vertex(other->index(c));
-            if (!dt.is_infinite(apex) && dt.side_of_sphere(c, apex->point()) == CGAL::ON_BOUNDED_SIDE)
-                star = Star::EmbeddedOnly;
+    const auto delaunay = [&](int c) {
+        for (int k = 0; k < 4; ++k) {
+            const int apex = cells.vertices[cells.neighbour(c, k)][cells.mirror_index(c, k)];
+            if (apex >= 0 && dt_.in_conflict(c, at[apex])) return false;
         }
-    v->set_point(before);
-    return star;
+        return true;
+    };
+    Star result = Star::Delaunay;
+    if (!std::all_of(star.begin(), star.end(), upright))
+        result = Star::Broken;
+    else if (!std::all_of(star.begin(), star.end(), delaunay))
+        result = Star::EmbeddedOnly;
+    dt_.points[number] = before;
+    return result;
 }
 
 void LivingDelaunay::neighbours(int number, std::vector<int>& result) const {
     result.clear();
-    if (!has(number) || impl_->dt.dimension() < 3) return;
-    std::vector<Vertex> found;
-    impl_->dt.finite_adjacent_vertices(impl_->vertex[number], std::back_inserter(found));
-    for (const Vertex& v : found) result.push_back(v->info());
-}
-
-const Tetrahedra& LivingDelaunay::cells() {
-    if (!impl_->mirrored) impl_->mirror();
-    return impl_->flat;
+    if (!has(number)) return;
+    for (const int c : star_of(number))
+        for (const int v : dt_.cells().vertices[c])
+            if (v >= 0 && v != number) result.push_back(v);
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
 }
 
 std::vector<int> LivingDelaunay::take_changed() {
-    cells();
-    std::vector<int> changed = std::exchange(impl_->changed, {});
+    std::vector<int> changed = std::exchange(changed_, {});
     if (!std::is_sorted(changed.begin(), changed.end())) std::sort(changed.begin(), changed.end());
     changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
     return changed;
-}
-
-const UpdateProfile& LivingDelaunay::profile() const {
-    return impl_->profile;
 }
 
 }  // namespace isotrack

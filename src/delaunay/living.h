@@ -1,19 +1,16 @@
-// CGAL's Delaunay triangulation, with vertices by number and a flat copy that follows every change.
+// A DT with vertices by number that is changed in place.
 #pragma once
 
-#include <memory>
 #include <vector>
 
+#include "delaunay/incremental.h"
 #include "isotrack/delaunay/tetrahedralisation.h"
 
 namespace isotrack {
 
-/// A DT that is changed in place. Not for concurrent use.
+/// Not for concurrent use.
 class LivingDelaunay {
 public:
-    LivingDelaunay();
-    ~LivingDelaunay();
-
     /// Starts anew with vertex i at points[i], where `there` (all when empty) is set; of several points on
     /// one place one has a vertex.
     void assign(const std::vector<Vec3>& points, const std::vector<char>& there = {});
@@ -23,15 +20,15 @@ public:
     void remove(int number);
     /// Inserts at p, then removes from where it was: faster than the other way round (the paper's 4.3).
     void relocate(int number, const Vec3& p);
-    bool has(int number) const;
-    std::size_t size() const;  ///< Vertices.
+    bool has(int number) const { return number < static_cast<int>(there_.size()) && there_[number]; }
+    std::size_t size() const { return size_; }  ///< Vertices.
 
-    /// Vertex i becomes to[i]; to[i] < 0: there is none.
+    /// Vertex i becomes to[i] <= i; to[i] < 0: there is none.
     void renumber(const std::vector<int>& to);
 
-    Vec3 position(int number) const;
+    const Vec3& position(int number) const { return dt_.points[number]; }
     /// Sets a position as it is; the triangulation around it may be none any more.
-    void set_position(int number, const Vec3& p);
+    void set_position(int number, const Vec3& p) { dt_.points[number] = p; }
 
     enum class Star { Delaunay, EmbeddedOnly, Broken };
     /// What the cells around a vertex would be with the vertex at p: all positively oriented and each locally
@@ -41,15 +38,30 @@ public:
     void neighbours(int number, std::vector<int>& result) const;
 
     /// Slots that hold no cell any more have only infinite vertices and are their own neighbours.
-    const Tetrahedra& cells();
+    const Tetrahedra& cells() const { return dt_.cells(); }
     /// The slots of `cells()` written since the last call, ascending; `assign` writes all.
     std::vector<int> take_changed();
 
-    const UpdateProfile& profile() const;  ///< Since the first `assign`.
+    const UpdateProfile& profile() const { return profile_; }  ///< Since the first `assign`.
 
 private:
-    struct Impl;
-    std::unique_ptr<Impl> impl_;
+    void rebuild();
+    const std::vector<int>& star_of(int number) const;
+    void place(int number, int cell);
+    void take_out(int number);
+    bool fill_star(int number);
+
+    IncrementalDelaunay dt_;
+    std::vector<char> there_;  // by number: has a vertex
+    std::vector<int> a_cell_;  // by number: one of its cells, while there are any
+    int recent_ = 0;           // a cell, while there are any
+    std::size_t size_ = 0;
+    std::vector<int> changed_;
+    UpdateProfile profile_;
+
+    mutable std::vector<int> star_;
+    mutable std::vector<char> in_star_;  // by slot
+    IncrementalDelaunay hole_;
 };
 
 }  // namespace isotrack

@@ -1,6 +1,8 @@
 #include "isotrack/delaunay/tetrahedralisation.h"
 
 #include <algorithm>
+#include <numeric>
+#include <utility>
 
 #include "delaunay/living.h"
 
@@ -216,9 +218,12 @@ private:
 }  // namespace
 
 Tetrahedra tetrahedralise(const std::vector<Vec3>& points) {
-    LivingDelaunay dt;
-    dt.assign(points);
-    return dt.cells();
+    IncrementalDelaunay dt;
+    dt.points = points;
+    std::vector<int> all(points.size());
+    std::iota(all.begin(), all.end(), 0);
+    dt.build(all);
+    return std::move(dt.slots());
 }
 
 Adjacency vertex_adjacency(const Tetrahedra& cells, std::size_t count) {

@@ -137,7 +137,7 @@ std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec
     Vec3 inner, outer;
     if (!centre_of(cell, inner)) return std::nullopt;
     const double low = (inner - middle).dot(axis);
-    const int other = cells.neighbours[cell][facet];
+    const int other = cells.neighbour(cell, facet);
     double high = std::max(low, 0.0) + to_middle.norm();
     if (!cells.is_infinite(other)) {
         if (!centre_of(other, outer)) return std::nullopt;

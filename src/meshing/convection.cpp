@@ -84,7 +84,7 @@ void update_labels(CellLabels& labels, const std::vector<int>& changed, const Te
         for (int step = 0; step < kLongestFlow && labels[at] == kFlat; ++step) {
             const int exit = flow_exit(cells, points, at);
             if (exit < 0) break;
-            at = cells.neighbours[at][exit];
+            at = cells.neighbour(at, exit);
         }
         labels[c] = labels[at] == kInside ? kInside : kOutside;
     }
@@ -105,7 +105,7 @@ CellLabels pure_convection(const Tetrahedra& cells, const std::vector<Vec3>& poi
     while (!front.empty()) {
         const HalfFacet f = front.back();
         front.pop_back();
-        const int inner = cells.neighbours[f.cell][f.k];
+        const int inner = cells.neighbour(f.cell, f.k);
         if (labels[inner] == kOutside) continue;
         const auto& v = cells.vertices[inner];
         const int apex = cells.mirror_index(f.cell, f.k);

@@ -22,7 +22,7 @@ public:
             for (std::size_t c = block * kBlock; c < std::min(cells.size(), (block + 1) * kBlock); ++c) {
                 if (!labels[c]) continue;
                 for (int k = 0; k < 4; ++k)
-                    if (!labels[cells.neighbours[c][k]]) blocks[block].push_back({static_cast<int>(c), k});
+                    if (!labels[cells.neighbour(c, k)]) blocks[block].push_back({static_cast<int>(c), k});
             }
         });
         for (const auto& block : blocks) facets_.insert(facets_.end(), block.begin(), block.end());
@@ -48,8 +48,8 @@ public:
         int cross =
             Tetrahedra::kFacet[facets_[facet].k][corner];  // the facet to cross next is opposite this vertex
         int other = facets_[facet].k;                      // the remaining vertex off the edge
-        while (labels_[cells_.neighbours[cell][cross]]) {
-            const int next = cells_.neighbours[cell][cross];
+        while (labels_[cells_.neighbour(cell, cross)]) {
+            const int next = cells_.neighbour(cell, cross);
             const int pivot = cells_.vertices[cell][other];
             const int entry = cells_.mirror_index(cell, cross);
             cell = next;

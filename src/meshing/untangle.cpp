@@ -33,8 +33,8 @@ void ring_of(const Tetrahedra& cells, const Edge& edge, std::vector<int>& ring) 
     int cross = other[0], pivot = cells.vertices[cell][other[1]];
     do {
         ring.push_back(cell);
-        const int entry = cells.vertices[cells.neighbours[cell][cross]][cells.mirror_index(cell, cross)];
-        cell = cells.neighbours[cell][cross];
+        const int entry = cells.vertices[cells.neighbour(cell, cross)][cells.mirror_index(cell, cross)];
+        cell = cells.neighbour(cell, cross);
         cross = cells.index_of(cell, pivot);
         pivot = entry;
     } while (cell != edge.cell);
@@ -55,7 +55,7 @@ std::vector<std::vector<int>> fans_of(const Tetrahedra& cells, const CellLabels&
     for (std::size_t s = 0; s < star.size(); ++s)
         for (int k = 0; k < 4; ++k) {
             if (cells.vertices[star[s]][k] == vertex) continue;
-            const int next = cells.neighbours[star[s]][k];
+            const int next = cells.neighbour(star[s], k);
             if (std::find(star.begin(), star.end(), next) == star.end()) star.push_back(next);
         }
     std::vector<char> taken(star.size(), 0);
@@ -66,7 +66,7 @@ std::vector<std::vector<int>> fans_of(const Tetrahedra& cells, const CellLabels&
         for (std::size_t f = 0; f < fan.size(); ++f)
             for (int k = 0; k < 4; ++k) {
                 if (cells.vertices[fan[f]][k] == vertex) continue;
-                const int next = cells.neighbours[fan[f]][k];
+                const int next = cells.neighbour(fan[f], k);
                 const auto at =
                     static_cast<std::size_t>(std::find(star.begin(), star.end(), next) - star.begin());
                 if (taken[at] || labels[next] != labels[fan[0]]) continue;

@@ -18,7 +18,7 @@ std::vector<BoundaryFacet> boundary_of(const std::vector<int>& some, const Tetra
     std::vector<BoundaryFacet> facets;
     for (const int c : some)
         for (int k = 0; k < 4; ++k) {
-            const int other = cells.neighbours[c][k];
+            const int other = cells.neighbour(c, k);
             if (labels[c] && !labels[other]) facets.push_back({c, k});
             if (!labels[c] && labels[other]) facets.push_back({other, cells.mirror_index(c, k)});
         }

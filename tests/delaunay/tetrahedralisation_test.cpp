@@ -112,7 +112,7 @@ TEST(Tetrahedralise, GivesTheSameCellsInTheSameOrder) {
     const auto points = random_points(300, 9);
     const Tetrahedra a = tetrahedralise(points), b = tetrahedralise(points);
     EXPECT_EQ(a.vertices, b.vertices);
-    EXPECT_EQ(a.neighbours, b.neighbours);
+    EXPECT_EQ(a.links, b.links);
 }
 
 TEST(Tetrahedralise, ClosesTheHullByOneInfiniteVertex) {
@@ -133,8 +133,8 @@ TEST(Tetrahedralise, OrientsCellsAndFacetsAndLinksNeighboursBothWays) {
     for (std::size_t c = 0; c < cells.size(); ++c) {
         const auto& v = cells.vertices[c];
         for (int k = 0; k < 4; ++k) {
-            const int n = cells.neighbours[c][k], m = cells.mirror_index(static_cast<int>(c), k);
-            EXPECT_EQ(cells.neighbours[n][m], static_cast<int>(c));
+            const int n = cells.neighbour(c, k), m = cells.mirror_index(static_cast<int>(c), k);
+            EXPECT_EQ(cells.neighbour(n, m), static_cast<int>(c));
             // The neighbour has the facet's three vertices and not the one opposite.
             for (int j = 0; j < 4; ++j)
                 if (j != k) {
@@ -266,9 +266,9 @@ TEST_P(UpdateStrategies, EqualsAFreshBuildAfterAnyHistory) {
         const Tetrahedra& cells = dt->cells();
         for (std::size_t c = 0; c < cells.size(); ++c)
             for (int k = 0; k < 4; ++k) {
-                const int n = cells.neighbours[c][k];
+                const int n = cells.neighbour(c, k);
                 if (n == static_cast<int>(c)) continue;
-                ASSERT_EQ(cells.neighbours[n][cells.mirror_index(static_cast<int>(c), k)],
+                ASSERT_EQ(cells.neighbour(n, cells.mirror_index(static_cast<int>(c), k)),
                           static_cast<int>(c));
             }
         if (round % 5 == 4) {

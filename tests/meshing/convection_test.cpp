@@ -200,7 +200,7 @@ std::string wrong_count(const Tetrahedra& cells, const CellLabels& labels, const
     std::set<int> on_boundary;
     for (std::size_t c = 0; c < cells.size(); ++c)
         for (int k = 0; k < 4; ++k) {
-            if (!labels[c] || labels[cells.neighbours[c][k]]) continue;
+            if (!labels[c] || labels[cells.neighbour(c, k)]) continue;
             int v[3];
             for (int i = 0; i < 3; ++i) v[i] = cells.vertices[c][Tetrahedra::kFacet[k][i]];
             for (int i = 0; i < 3; ++i) {
@@ -299,7 +299,7 @@ TEST(Carve, SaysWhichCellIsBehindEachTriangle) {
     for (std::size_t t = 0; t < carved.triangles.size(); ++t) {
         const int c = carved.inside_cell[t], k = carved.inside_facet[t];
         EXPECT_EQ(labels[c], 1);
-        EXPECT_EQ(labels[s.cells.neighbours[c][k]], 0);
+        EXPECT_EQ(labels[s.cells.neighbour(c, k)], 0);
         std::set<int> facet, expected;
         for (int v = 0; v < 3; ++v) {
             facet.insert(carved.particle[carved.triangles[t][v]]);
@@ -577,7 +577,7 @@ std::vector<std::pair<int, int>> boundary_facets(const Tetrahedra& cells, const 
     std::vector<std::pair<int, int>> facets;
     for (std::size_t c = 0; c < cells.size(); ++c)
         for (int k = 0; labels[c] && k < 4; ++k)
-            if (!labels[cells.neighbours[c][k]]) facets.emplace_back(c, k);
+            if (!labels[cells.neighbour(c, k)]) facets.emplace_back(c, k);
     return facets;
 }
 

@@ -19,10 +19,16 @@ struct Tetrahedra {
     /// outside the cell.
     static constexpr int kFacet[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
 
-    std::vector<std::array<int, 4>> vertices;    ///< Per cell; positively oriented; at most one is kInfinite.
-    std::vector<std::array<int, 4>> neighbours;  ///< Per cell: the cell across the facet opposite vertex k.
+    std::vector<std::array<int, 4>> vertices;  ///< Per cell; positively oriented; at most one is kInfinite.
+    std::vector<std::array<int, 4>> links;     ///< Per cell, across the facet opposite vertex k: 4 n + m, for
+                                               ///< cell n and the index m in it of the vertex across.
 
     std::size_t size() const { return vertices.size(); }
+    static int link(int cell, int m) { return 4 * cell + m; }
+    /// The cell across the facet opposite vertex k.
+    int neighbour(int cell, int k) const { return links[cell][k] >> 2; }
+    /// The index, in that one, of the vertex across the common facet.
+    int mirror_index(int cell, int k) const { return links[cell][k] & 3; }
     bool is_infinite(int cell) const {
         const auto& v = vertices[cell];
         return v[0] < 0 || v[1] < 0 || v[2] < 0 || v[3] < 0;
@@ -32,23 +38,18 @@ struct Tetrahedra {
         const auto& v = vertices[cell];
         return v[0] == vertex ? 0 : v[1] == vertex ? 1 : v[2] == vertex ? 2 : 3;
     }
-    /// The index, in neighbour k of `cell`, of the vertex across the common facet.
-    int mirror_index(int cell, int k) const {
-        const auto& back = neighbours[neighbours[cell][k]];
-        return back[0] == cell ? 0 : back[1] == cell ? 1 : back[2] == cell ? 2 : 3;
-    }
 };
 
 /// How a DT follows its points.
 enum class UpdateStrategy {
     Rebuild,  ///< Changes are only noted; `settle` builds anew.
     Move,     ///< The paper's algorithm 3: a vertex moves in place when its star stays embedded and Delaunay,
-           ///< else it is inserted anew, then removed from where it was. Exact after every call.
+              ///< else it is inserted anew, then removed from where it was. Exact after every call.
     Lazy,  ///< The paper's section 4.3: a vertex has a second position, in the DT, and follows its true one
            ///< only when that has broken the embedding (score 2 each) or the Delaunay property (score 1) up
            ///< to a score of 4.
-    Auto  ///< Changes are only noted; `settle` does what is predicted to be cheaper: relocate what moved, or
-          ///< build anew.
+    Auto   ///< Changes are only noted; `settle` does what is predicted to be cheaper: relocate what moved, or
+           ///< build anew.
 };
 const char* name_of(UpdateStrategy strategy);
 

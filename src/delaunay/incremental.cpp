@@ -1,0 +1,244 @@
+#include "delaunay/incremental.h"
+
+#include <algorithm>
+
+#include "delaunay/filters.h"
+#include "delaunay/spatial_order.h"
+
+namespace isotrack {
+namespace {
+
+constexpr int kNone = -1;
+constexpr char kUnseen = 0, kConflict = 1, kRim = 2;
+
+bool infinite(const std::array<int, 4>& v) {
+    return (v[0] | v[1] | v[2] | v[3]) < 0;
+}
+
+int index_in(const std::array<int, 4>& v, int vertex) {
+    return (v[1] == vertex) + 2 * (v[2] == vertex) + 3 * (v[3] == vertex);  // no branches to mispredict
+}
+
+}  // namespace
+
+int IncrementalDelaunay::locate(const Vec3& p, int start) const {
+    int cell = start, from = -1;
+    if (infinite(cells_.vertices[cell]))
+        cell = cells_.neighbour(cell, index_in(cells_.vertices[cell], Tetrahedra::kInfinite));
+    for (;;) {
+        const auto& v = cells_.vertices[cell];
+        if (infinite(v)) return cell;
+        int exit = -1;
+        for (int k = 0; k < 4 && exit < 0; ++k) {
+            if (k == from) continue;
+            const Vec3* q[4] = {&points[v[0]], &points[v[1]], &points[v[2]], &points[v[3]]};
+            q[k] = &p;
+            if (filtered_orientation(*q[0], *q[1], *q[2], *q[3]) < 0) exit = k;
+        }
+        if (exit < 0) return cell;
+        const int link = cells_.links[cell][exit];
+        cell = link >> 2;
+        from = link & 3;
+    }
+}
+
+int IncrementalDelaunay::vertex_at(const Vec3& p, int cell) const {
+    for (const int v : cells_.vertices[cell])
+        if (v >= 0 && points[v] == p) return v;
+    return -1;
+}
+
+bool IncrementalDelaunay::in_conflict(int cell, const Vec3& p) const {
+    const auto& v = cells_.vertices[cell];
+    if (!infinite(v)) return filtered_in_sphere(points[v[0]], points[v[1]], points[v[2]], points[v[3]], p);
+    const int k = index_in(v, Tetrahedra::kInfinite);
+    const Vec3* q[4] = {&p, &p, &p, &p};
+    for (int j = 0; j < 4; ++j)
+        if (j != k) q[j] = &points[v[j]];
+    const int side = filtered_orientation(*q[0], *q[1], *q[2], *q[3]);
+    // In the plane of the facet the circle decides, in which that plane cuts the sphere of the cell behind
+    // it.
+    return side != 0 ? side > 0 : in_conflict(cells_.neighbour(cell, k), p);
+}
+
+/// The number of a vertex among those of the rim.
+int IncrementalDelaunay::corner(int vertex) {
+    int& number = corner_of_[vertex + 1];  // the infinite one may be among them
+    if (number == kNone) {
+        number = static_cast<int>(corners_.size());
+        corners_.push_back(vertex);
+    }
+    return number;
+}
+
+void IncrementalDelaunay::insert(int vertex, int cell) {
+    const Vec3& p = points[vertex];
+    corner_of_.resize(points.size() + 1, kNone);
+    freed_.assign(1, cell);
+    rim_.clear();
+    marks_[cell] = kConflict;
+    for (std::size_t i = 0; i < freed_.size(); ++i)
+        for (int k = 0; k < 4; ++k) {
+            const int other = cells_.neighbour(freed_[i], k);
+            if (marks_[other] == kUnseen) {
+                marks_[other] = in_conflict(other, p) ? kConflict : kRim;
+                if (marks_[other] == kConflict) freed_.push_back(other);
+            }
+            if (marks_[other] == kRim) rim_.push_back({freed_[i], k});
+        }
+
+    // A cell on every facet of the rim. They meet at the facets between the new vertex and the edges of the
+    // rim, each of which two facets have, in opposite directions.
+    corners_.clear();
+    const std::size_t count = rim_.size() / 2 + 2;  // of vertices on the rim, by Euler's formula
+    edges_.resize(count * count);
+    fresh_.clear();
+    for (const Facet& facet : rim_) {
+        const int slot = new_slot(), outside = cells_.links[facet.cell][facet.k];
+        fresh_.push_back(slot);
+        auto& v = cells_.vertices[slot];
+        v = cells_.vertices[facet.cell];
+        v[facet.k] = vertex;
+        cells_.links[slot][facet.k] = outside;
+        cells_.links[outside >> 2][outside & 3] = Tetrahedra::link(slot, facet.k);
+        marks_[outside >> 2] = kUnseen;
+        const auto& f = Tetrahedra::kFacet[facet.k];
+        for (int j = 0; j < 3; ++j)
+            edges_[count * corner(v[f[j]]) + corner(v[f[(j + 1) % 3]])] =
+                Tetrahedra::link(slot, f[(j + 2) % 3]);
+    }
+    for (std::size_t i = 0; i < rim_.size(); ++i) {
+        const int slot = fresh_[i];
+        const auto& v = cells_.vertices[slot];
+        const auto& f = Tetrahedra::kFacet[rim_[i].k];
+        for (int j = 0; j < 3; ++j)
+            cells_.links[slot][f[(j + 2) % 3]] = edges_[count * corner(v[f[(j + 1) % 3]]) + corner(v[f[j]])];
+    }
+    for (const int w : corners_) corner_of_[w + 1] = kNone;
+    for (const int slot : freed_) free_slot(slot);
+}
+
+int IncrementalDelaunay::new_slot() {
+    if (!free_.empty()) {
+        const int slot = free_.back();
+        free_.pop_back();
+        return slot;
+    }
+    // Cells are the most of what a DT holds: twice the room for a few more would be too much.
+    constexpr std::size_t kSlack = 16;  // of as many
+    if (cells_.size() == cells_.vertices.capacity()) {
+        const std::size_t room = cells_.size() + cells_.size() / kSlack + kSlack;
+        cells_.vertices.reserve(room);
+        cells_.links.reserve(room);
+        marks_.reserve(room);
+    }
+    cells_.vertices.emplace_back();
+    cells_.links.emplace_back();
+    marks_.push_back(kUnseen);
+    return static_cast<int>(cells_.size()) - 1;
+}
+
+void IncrementalDelaunay::free_slot(int slot) {
+    cells_.vertices[slot].fill(Tetrahedra::kInfinite);
+    for (int k = 0; k < 4; ++k) cells_.links[slot][k] = Tetrahedra::link(slot, k);
+    marks_[slot] = kUnseen;
+    free_.push_back(slot);
+}
+
+/// Finds four vertices that span a volume and makes the five cells they have.
+bool IncrementalDelaunay::start(const std::vector<int>& order, std::array<int, 4>& first) {
+    std::size_t found = 0;
+    for (const int v : order) {
+        const Vec3& p = points[v];
+        bool further = true;  // off the point, line or plane of those found
+        if (found == 1) further = p != points[first[0]];
+        if (found == 2) further = !collinear(points[first[0]], points[first[1]], p);
+        if (found == 3) further = orientation(points[first[0]], points[first[1]], points[first[2]], p) != 0;
+        if (further) first[found++] = v;
+        if (found == 4) break;
+    }
+    if (found < 4) return false;
+    if (orientation(points[first[0]], points[first[1]], points[first[2]], points[first[3]]) < 0)
+        std::swap(first[2], first[3]);
+    // Cell 0 is the finite one; cell 1 + k is across its facet opposite vertex k, with the infinite vertex
+    // for that one and, to be oriented as it should, two of the others exchanged.
+    for (int c = 0; c < 5; ++c) new_slot();
+    cells_.vertices[0] = first;
+    for (int k = 0; k < 4; ++k) {
+        const int a = (k + 1) % 4, b = (k + 2) % 4;
+        auto& v = cells_.vertices[1 + k];
+        v = first;
+        v[k] = Tetrahedra::kInfinite;
+        std::swap(v[a], v[b]);
+        cells_.links[0][k] = Tetrahedra::link(1 + k, k);
+        cells_.links[1 + k][k] = Tetrahedra::link(0, k);
+    }
+    for (int k = 0; k < 4; ++k)
+        for (int j = 0; j < 4; ++j)
+            if (j != k) {
+                // Two of the infinite cells share the facet without either's vertex of the first cell.
+                const int mine = index_in(cells_.vertices[1 + k], first[j]),
+                          its = index_in(cells_.vertices[1 + j], first[k]);
+                cells_.links[1 + k][mine] = Tetrahedra::link(1 + j, its);
+            }
+    return true;
+}
+
+void IncrementalDelaunay::build(std::vector<int>& chosen) {
+    cells_.vertices.clear();
+    cells_.links.clear();
+    marks_.clear();
+    free_.clear();
+    std::vector<int> order = chosen;
+    sort_spatially(points, order);
+    std::array<int, 4> first;
+    if (!start(order, first)) return;
+    constexpr std::size_t kCells = 7;  // per vertex of a sampled surface, about
+    cells_.vertices.reserve(kCells * order.size());
+    cells_.links.reserve(kCells * order.size());
+    marks_.reserve(kCells * order.size());
+    int near = 0;
+    std::vector<int> twice;
+    for (const int v : order) {
+        if (std::find(first.begin(), first.end(), v) != first.end()) continue;
+        const int cell = locate(points[v], near);
+        if (vertex_at(points[v], cell) >= 0) {
+            twice.push_back(v);
+            near = cell;
+            continue;
+        }
+        insert(v, cell);
+        near = fresh_.front();
+    }
+    close_gaps();
+    if (!twice.empty()) {
+        std::sort(twice.begin(), twice.end());
+        const auto is_twice = [&](int v) { return std::binary_search(twice.begin(), twice.end(), v); };
+        chosen.erase(std::remove_if(chosen.begin(), chosen.end(), is_twice), chosen.end());
+    }
+}
+
+/// Moves cells from the end to slots that are free.
+void IncrementalDelaunay::close_gaps() {
+    std::sort(free_.begin(), free_.end());
+    int last = static_cast<int>(cells_.size()) - 1;
+    std::size_t left = free_.size();  // those below `last` that are free: free_[0 .. left)
+    for (std::size_t i = 0; i < left; ++i) {
+        while (left > i && free_[left - 1] == last) --left, --last;
+        if (i >= left) break;
+        const int slot = free_[i];
+        cells_.vertices[slot] = cells_.vertices[last];
+        cells_.links[slot] = cells_.links[last];
+        for (int k = 0; k < 4; ++k) {
+            const int link = cells_.links[slot][k];
+            cells_.links[link >> 2][link & 3] = Tetrahedra::link(slot, k);
+        }
+        --last;
+    }
+    cells_.vertices.resize(last + 1);
+    cells_.links.resize(last + 1);
+    marks_.resize(last + 1);
+    free_.clear();
+}
+
+}  // namespace isotrack

@@ -1,0 +1,35 @@
+#include "delaunay/spatial_order.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/property_map.h>
+#include <CGAL/spatial_sort.h>
+
+namespace isotrack {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+
+/// Points as CGAL sorts them: by coordinates, looked up by number.
+struct ByNumber {
+    using Point_3 = int;
+    struct Less {
+        const std::vector<Vec3>& points;
+        int axis;
+        bool operator()(int a, int b) const { return points[a][axis] < points[b][axis]; }
+    };
+    using Less_x_3 = Less;
+    using Less_y_3 = Less;
+    using Less_z_3 = Less;
+    const std::vector<Vec3>& points;
+    Less less_x_3_object() const { return {points, 0}; }
+    Less less_y_3_object() const { return {points, 1}; }
+    Less less_z_3_object() const { return {points, 2}; }
+};
+
+}  // namespace
+
+void sort_spatially(const std::vector<Vec3>& points, std::vector<int>& order) {
+    CGAL::spatial_sort(order.begin(), order.end(), ByNumber{points});
+}
+
+}  // namespace isotrack

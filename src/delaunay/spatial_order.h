@@ -1,0 +1,15 @@
+// The order in which points are best inserted.
+#pragma once
+
+#include <vector>
+
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// Sorts numbers of points so that one is near the one before, in rounds that each take a random eighth of
+/// what is left for the rounds after it (Amenta, Choi and Rote 2003). Depends on the points and `order`
+/// alone.
+void sort_spatially(const std::vector<Vec3>& points, std::vector<int>& order);
+
+}  // namespace isotrack
