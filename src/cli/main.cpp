@@ -11,12 +11,14 @@
 
 #include "cli/commands.h"
 #include "isotrack/error.h"
+#include "isotrack/memory.h"
 
 int main(int argc, char** argv) {
     using namespace isotrack;
     int result = 0;
     bool quiet = false;
     int verbosity = 0, threads = 0;
+    keep_little_memory();
 
     CLI::App app{"isotrack " ISOTRACK_VERSION ": OpenVDB level-set sequences to adaptive watertight meshes"};
     app.set_version_flag("--version", "isotrack " ISOTRACK_VERSION);

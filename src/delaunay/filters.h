@@ -35,15 +35,16 @@ inline int filtered_orientation(const Vec3& p, const Vec3& q, const Vec3& r, con
 
 /// As `in_sphere`, exact, and fast where the points are in general position.
 inline bool filtered_in_sphere(const Vec3& p, const Vec3& q, const Vec3& r, const Vec3& s, const Vec3& v) {
-    const Vec3 a = p - v, b = q - v, c = r - v, d = s - v;
-    const double ab = a.x() * b.y() - a.y() * b.x(), bc = b.x() * c.y() - b.y() * c.x(),
-                 cd = c.x() * d.y() - c.y() * d.x(), da = d.x() * a.y() - d.y() * a.x(),
-                 ac = a.x() * c.y() - a.y() * c.x(), bd = b.x() * d.y() - b.y() * d.x();
-    const double abc = a.z() * bc - b.z() * ac + c.z() * ab, bcd = b.z() * cd - c.z() * bd + d.z() * bc,
-                 cda = c.z() * da + d.z() * ac + a.z() * cd, dab = d.z() * ab + a.z() * bd + b.z() * da;
-    const double aa = a.squaredNorm(), bb = b.squaredNorm(), cc = c.squaredNorm(), dd = d.squaredNorm();
-    const double det = (aa * bcd - bb * cda) + (cc * dab - dd * abc);
-    const double largest = std::max(std::max(aa, bb), std::max(cc, dd));
+    using Four = Eigen::Array4d;  // one entry for each of p, q, r, s, relative to v
+    const auto next = [](const Four& f) { return Four(f[1], f[2], f[3], f[0]); };
+    const auto after_next = [](const Four& f) { return Four(f[2], f[3], f[0], f[1]); };
+    const Four x = Four(p.x(), q.x(), r.x(), s.x()) - v.x(), y = Four(p.y(), q.y(), r.y(), s.y()) - v.y(),
+               z = Four(p.z(), q.z(), r.z(), s.z()) - v.z();
+    const Four square = x * x + y * y + z * z;
+    const Four beside = x * next(y) - y * next(x), across = x * after_next(y) - y * after_next(x);
+    const Four volume = z * next(beside) - next(z) * across + after_next(z) * beside;
+    const Four term = square * next(volume);
+    const double det = (term[0] - term[1]) + (term[2] - term[3]), largest = square.maxCoeff();
     const double bound = filters::kInSphere * 4.62 * largest * largest * std::sqrt(largest);
     if (bound > filters::kSmallest && std::abs(det) > bound) return det > 0.0;
     return in_sphere(p, q, r, s, v);

@@ -1,9 +1,12 @@
 #include "delaunay/incremental.h"
 
 #include <algorithm>
+#include <numeric>
+#include <utility>
 
 #include "delaunay/filters.h"
 #include "delaunay/spatial_order.h"
+#include "sampling/room.h"
 
 namespace isotrack {
 namespace {
@@ -124,14 +127,9 @@ int IncrementalDelaunay::new_slot() {
         free_.pop_back();
         return slot;
     }
-    // Cells are the most of what a DT holds: twice the room for a few more would be too much.
-    constexpr std::size_t kSlack = 16;  // of as many
-    if (cells_.size() == cells_.vertices.capacity()) {
-        const std::size_t room = cells_.size() + cells_.size() / kSlack + kSlack;
-        cells_.vertices.reserve(room);
-        cells_.links.reserve(room);
-        marks_.reserve(room);
-    }
+    make_room(cells_.vertices);
+    make_room(cells_.links);
+    make_room(marks_);
     cells_.vertices.emplace_back();
     cells_.links.emplace_back();
     marks_.push_back(kUnseen);
@@ -210,7 +208,7 @@ void IncrementalDelaunay::build(std::vector<int>& chosen) {
         insert(v, cell);
         near = fresh_.front();
     }
-    close_gaps();
+    arrange();
     if (!twice.empty()) {
         std::sort(twice.begin(), twice.end());
         const auto is_twice = [&](int v) { return std::binary_search(twice.begin(), twice.end(), v); };
@@ -218,26 +216,35 @@ void IncrementalDelaunay::build(std::vector<int>& chosen) {
     }
 }
 
-/// Moves cells from the end to slots that are free.
-void IncrementalDelaunay::close_gaps() {
-    std::sort(free_.begin(), free_.end());
-    int last = static_cast<int>(cells_.size()) - 1;
-    std::size_t left = free_.size();  // those below `last` that are free: free_[0 .. left)
-    for (std::size_t i = 0; i < left; ++i) {
-        while (left > i && free_[left - 1] == last) --left, --last;
-        if (i >= left) break;
-        const int slot = free_[i];
-        cells_.vertices[slot] = cells_.vertices[last];
-        cells_.links[slot] = cells_.links[last];
-        for (int k = 0; k < 4; ++k) {
-            const int link = cells_.links[slot][k];
-            cells_.links[link >> 2][link & 3] = Tetrahedra::link(slot, k);
-        }
-        --last;
-    }
-    cells_.vertices.resize(last + 1);
-    cells_.links.resize(last + 1);
-    marks_.resize(last + 1);
+/// Numbers the cells anew, by their first vertices: those that are near each other in memory are so in space
+/// as far as the points are. No slot is free then.
+void IncrementalDelaunay::arrange() {
+    const std::size_t slots = cells_.size();
+    const auto key = [&](std::size_t c) {  // that of the infinite vertex is the largest
+        const auto& v = cells_.vertices[c];
+        return std::min(std::min(static_cast<unsigned>(v[0]), static_cast<unsigned>(v[1])),
+                        std::min(static_cast<unsigned>(v[2]), static_cast<unsigned>(v[3])));
+    };
+    for (const int slot : free_) marks_[slot] = kRim;
+    std::vector<int> next(points.size() + 1, 0);
+    for (std::size_t c = 0; c < slots; ++c)
+        if (marks_[c] == kUnseen) ++next[key(c) + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    std::vector<int> number(slots);
+    for (std::size_t c = 0; c < slots; ++c)
+        if (marks_[c] == kUnseen) number[c] = next[key(c)]++;
+    // One array after the other: with both twice a DT would take its most memory here.
+    const std::size_t count = slots - free_.size();
+    const auto move = [&](std::vector<std::array<int, 4>>& values, const auto& renamed) {
+        std::vector<std::array<int, 4>> result(count);
+        for (std::size_t c = 0; c < slots; ++c)
+            if (marks_[c] == kUnseen)
+                for (int k = 0; k < 4; ++k) result[number[c]][k] = renamed(values[c][k]);
+        values.swap(result);
+    };
+    move(cells_.vertices, [](int vertex) { return vertex; });
+    move(cells_.links, [&](int link) { return Tetrahedra::link(number[link >> 2], link & 3); });
+    marks_.assign(cells_.size(), kUnseen);
     free_.clear();
 }
 

@@ -48,7 +48,7 @@ public:
 private:
     bool start(const std::vector<int>& order, std::array<int, 4>& first);
     int corner(int vertex);
-    void close_gaps();
+    void arrange();
 
     Tetrahedra cells_;
     std::vector<int> free_;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "delaunay/filters.h"
+#include "sampling/room.h"
 
 namespace isotrack {
 namespace {
@@ -65,6 +66,8 @@ void LivingDelaunay::rebuild() {
 
 bool LivingDelaunay::insert(int number, const Vec3& p, int near) {
     if (number >= static_cast<int>(there_.size())) {
+        make_room(dt_.points);
+        make_room(a_cell_);
         dt_.points.resize(number + 1);
         there_.resize(number + 1, 0);
         a_cell_.resize(number + 1, -1);

@@ -1,7 +1,7 @@
 #include "delaunay/spatial_order.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/property_map.h>
+#include <CGAL/hilbert_sort.h>
 #include <CGAL/spatial_sort.h>
 
 namespace isotrack {
@@ -30,6 +30,10 @@ struct ByNumber {
 
 void sort_spatially(const std::vector<Vec3>& points, std::vector<int>& order) {
     CGAL::spatial_sort(order.begin(), order.end(), ByNumber{points});
+}
+
+void sort_along_curve(const std::vector<Vec3>& points, std::vector<int>& order) {
+    CGAL::hilbert_sort(order.begin(), order.end(), ByNumber{points});
 }
 
 }  // namespace isotrack

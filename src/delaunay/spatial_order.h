@@ -12,4 +12,7 @@ namespace isotrack {
 /// alone.
 void sort_spatially(const std::vector<Vec3>& points, std::vector<int>& order);
 
+/// The same in one round: along Hilbert's curve.
+void sort_along_curve(const std::vector<Vec3>& points, std::vector<int>& order);
+
 }  // namespace isotrack

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "delaunay/living.h"
+#include "sampling/room.h"
 
 namespace isotrack {
 namespace {
@@ -47,6 +48,7 @@ protected:
     virtual void assigned() {}
 
     int note_insert(const Vec3& point) {
+        make_room(points_);
         points_.push_back(point);
         there_.push_back(1);
         return static_cast<int>(points_.size()) - 1;

@@ -183,15 +183,15 @@ double FacingTriangle::squared_distance(const Surface::Crossing& crossing, doubl
 }
 
 void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                        const CrossingGrid& grid, const std::vector<std::size_t>& some, double cutoff,
+                        const CrossingGrid& grid, const std::vector<int>& some, double cutoff,
                         std::vector<double>& distances) {
     if (some.empty()) return;
     std::vector<char> wanted(grid.size(), 0);
-    const std::unique_ptr<std::size_t[]> number(new std::size_t[grid.size()]);  // of those among `some`
+    const std::unique_ptr<int[]> number(new int[grid.size()]);  // of those among `some`
     std::vector<LeastSquare> least(some.size());
     for (std::size_t u = 0; u < some.size(); ++u) {
         wanted[some[u]] = 1;
-        number[some[u]] = u;
+        number[some[u]] = static_cast<int>(u);
     }
     const auto for_each_block = [](std::size_t count, const auto& body) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 64), [&](const auto& range) {
@@ -223,8 +223,8 @@ void crossing_distances(const std::vector<Vec3>& points, const std::vector<Trian
             };
             grid.for_each_in(box_around(near[t], reach), measure, &columns);
         });
-        std::vector<std::size_t> left;
-        for (const std::size_t c : some) {
+        std::vector<int> left;
+        for (const int c : some) {
             wanted[c] = least[number[c]].get() > reach * reach;
             if (wanted[c]) left.push_back(c);
         }
@@ -232,11 +232,11 @@ void crossing_distances(const std::vector<Vec3>& points, const std::vector<Trian
     };
     // Most are near.
     constexpr double kNear = 0.4;
-    if (const std::vector<std::size_t> left = search(kNear * cutoff); !left.empty()) {
+    if (const std::vector<int> left = search(kNear * cutoff); !left.empty()) {
         columns = grid.columns_of(left);
         search(cutoff);
     }
-    for (const std::size_t c : some)
+    for (const int c : some)
         distances[c] =
             wanted[c] ? std::numeric_limits<double>::infinity() : std::sqrt(least[number[c]].get());
 }
@@ -245,8 +245,8 @@ std::vector<double> crossing_distances(const std::vector<Vec3>& points,
                                        const std::vector<Triangle>& triangles, const CrossingGrid& grid,
                                        double cutoff) {
     std::vector<double> distances(grid.size());
-    std::vector<std::size_t> all(grid.size());
-    std::iota(all.begin(), all.end(), std::size_t{0});
+    std::vector<int> all(grid.size());
+    std::iota(all.begin(), all.end(), 0);
     crossing_distances(points, triangles, grid, all, cutoff, distances);
     return distances;
 }

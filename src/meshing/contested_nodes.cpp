@@ -61,7 +61,10 @@ std::vector<Hit> hits_of(const std::vector<Vec3>& points, const std::vector<Tria
         for (std::size_t t = block * kBlock; t < end; ++t) add_hits(t, blocks[block]);
     });
     std::vector<Hit> hits;
-    for (const auto& block : blocks) hits.insert(hits.end(), block.begin(), block.end());
+    for (auto& block : blocks) {
+        hits.insert(hits.end(), block.begin(), block.end());
+        std::vector<Hit>().swap(block);
+    }
     return hits;
 }
 

@@ -104,6 +104,8 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     const std::size_t count = facets.size();
     CarvedSurface result;
     result.triangles.resize(count);
+    result.inside_cell.reserve(count);
+    result.inside_facet.reserve(count);
     for (std::size_t f = 0; f < count; ++f) {
         result.triangles[f] = boundary.particles(f);
         result.inside_cell.push_back(facets[f].cell);

@@ -1,4 +1,4 @@
-// Leaving out entries of what is stored per particle.
+// Leaving out and reordering entries of what is stored per particle.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +13,15 @@ void compact(std::vector<T>& values, const std::vector<char>& keep) {
     for (std::size_t from = 0; from < values.size(); ++from)
         if (keep[from]) values[to++] = values[from];
     values.resize(to);
+}
+
+/// Entry i becomes that of order[i].
+template <typename T>
+void reorder(std::vector<T>& values, const std::vector<int>& order) {
+    std::vector<T> result;
+    result.reserve(order.size());
+    for (const int i : order) result.push_back(values[i]);
+    values.swap(result);
 }
 
 /// The number that each entry has then; -1 for those left out.

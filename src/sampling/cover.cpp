@@ -60,9 +60,9 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     };
     if (particles.size() > 0) {
         mark_all(kNear, nullptr);
-        std::vector<std::size_t> open;
+        std::vector<int> open;
         for (std::size_t c = 0; c < grid.size(); ++c)
-            if (!covered[c]) open.push_back(c);
+            if (!covered[c]) open.push_back(static_cast<int>(c));
         const std::vector<char> columns = grid.columns_of(open);
         mark_all(kReach, &columns);
     }

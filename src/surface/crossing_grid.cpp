@@ -50,9 +50,9 @@ std::uint32_t CrossingGrid::direction_of(const Eigen::Vector3f& outward) {
     return number;
 }
 
-std::vector<char> CrossingGrid::columns_of(const std::vector<std::size_t>& some) const {
+std::vector<char> CrossingGrid::columns_of(const std::vector<int>& some) const {
     std::vector<char> result(first_.empty() ? 0 : first_.size() - 1, 0);
-    for (const std::size_t i : some) result[column_of(entries_[i])] = 1;
+    for (const int i : some) result[column_of(entries_[i])] = 1;
     return result;
 }
 

@@ -56,9 +56,9 @@ std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector
 }
 
 void Inspector::expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles) {
-    expected_.emplace(particles.size(), triangles);
-    expected_errors_ = triangle_errors(particles, expected_->triangles(), surface_, kStepsByLength,
-                                       kSuspect * limits_.tolerance);
+    expected_.emplace(Expected{{particles.size(), triangles}, {}});
+    expected_->errors = triangle_errors(particles, expected_->triangles.triangles(), surface_, kStepsByLength,
+                                        kSuspect * limits_.tolerance);
 }
 
 std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
@@ -70,14 +70,14 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     compare(
         facets, facets_,
         [&](std::size_t f, std::size_t old) {
-            known[f] = &errors_[old];
+            known[f] = &(*errors_)[old];
             seen[f] = 1;
         },
         [&](std::size_t f) {
             if (!distances_.empty()) came_.push_back(facets[f]);
             const auto [corner, whole] = corners_of(mesh.carved, f);
-            const int e = expected_ && whole ? expected_->find(corner) : -1;
-            if (e >= 0) known[f] = &expected_errors_[e];
+            const int e = expected_ && whole ? expected_->triangles.find(corner) : -1;
+            if (e >= 0) known[f] = &expected_->errors[e];
         },
         [&](std::size_t old) {
             if (!distances_.empty()) went_.push_back(facets_[old]);
@@ -90,21 +90,21 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     auto next = errors.begin();
     std::vector<Vec3> in_vain;
     const auto probe = surface_.probe();
+    const auto measured = std::make_shared<std::vector<TriangleError>>(facets.size());
     for (std::size_t f = 0; f < facets.size(); ++f) {
-        result.errors.push_back(known[f] ? *known[f] : *next++);
-        const TriangleError& error = result.errors.back();
+        const TriangleError& error = (*measured)[f] = known[f] ? *known[f] : *next++;
         if (error.largest > kCertified * limits_.tolerance && (seen[f] || !probe->project(error.where)))
             in_vain.push_back(error.where);
     }
     facets_ = std::move(facets);
-    errors_ = result.errors;
+    errors_ = result.errors = measured;
     expected_.reset();  // vertices may move from now on
     return in_vain;
 }
 
 std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection& result) {
     const double cutoff = kLostAt * limits_.tolerance;
-    const std::vector<std::size_t> missed_before = std::move(missed_);  // ascending
+    const std::vector<int> missed_before = std::move(missed_);  // ascending
     missed_.clear();
     const auto changed = static_cast<double>(std::max(came_.size(), went_.size()));
     if (distances_.empty() || changed > kMany * static_cast<double>(facets_.size())) {
@@ -123,13 +123,13 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
                 if (distances_[i] != kUnknown) body(triangle, i);
             });
         };
-        std::vector<std::size_t> unknown;
+        std::vector<int> unknown;
         for (const Facet& facet : went_)
             for_each_near(facet, [&](const FacingTriangle& triangle, std::size_t i) {
                 const double d = distances_[i] + same;
                 if (triangle.squared_distance(crossings_[i], d * d) > d * d) return;
                 distances_[i] = kUnknown;
-                unknown.push_back(i);
+                unknown.push_back(static_cast<int>(i));
             });
         for (const Facet& facet : came_)
             for_each_near(facet, [&](const FacingTriangle& triangle, std::size_t i) {
@@ -141,7 +141,7 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
     }
 
     struct Block {
-        std::vector<std::size_t> missed;
+        std::vector<int> missed;
         std::size_t lost = 0;
         double farthest = 0.0, sum = 0.0;
     };
@@ -150,7 +150,7 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
         Block& block = blocks[b];
         for (std::size_t c = b * kBlock; c < std::min(crossings_.size(), (b + 1) * kBlock); ++c) {
-            if (is_missed(distances_[c])) block.missed.push_back(c);
+            if (is_missed(distances_[c])) block.missed.push_back(static_cast<int>(c));
             if (!std::isfinite(distances_[c])) {
                 ++block.lost;
                 continue;
@@ -170,7 +170,7 @@ std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection
     const std::size_t found = crossings_.size() - result.lost_crossings;
     if (found > 0) result.crossings_mean_square = sum / static_cast<double>(found);
     std::vector<Vec3> in_vain;
-    for (const std::size_t c : missed_) {
+    for (const int c : missed_) {
         result.missed.push_back(crossings_[c]);
         if (std::binary_search(missed_before.begin(), missed_before.end(), c))
             in_vain.push_back(crossings_[c].point);
@@ -248,9 +248,9 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     const auto probe = surface.probe();
     const CarvedSurface& carved = mesh.carved;
     const auto is_too_far = [&](std::size_t t) {
-        return inspection.errors[t].largest > kCertified * limits.tolerance;
+        return (*inspection.errors)[t].largest > kCertified * limits.tolerance;
     };
-    std::vector<char> fails(inspection.errors.size());
+    std::vector<char> fails(inspection.errors->size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, fails.size(), 1024), [&](const auto& range) {
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
             const auto [corner, whole] = corners_of(carved, t);
@@ -271,7 +271,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             double h = limits.max_edge;
             for (const int p : corner)
                 if (p >= 0) h = std::min(h, particles.spacing[p]);
-            result.push_back({inspection.errors[t].where, 0.7 * h});
+            result.push_back({(*inspection.errors)[t].where, 0.7 * h});
         }
     }
     for (const auto& c : inspection.missed)
@@ -287,12 +287,13 @@ void report(const FrameMesh& mesh, const Inspection& inspection, const SizingLim
             TrackedFrame& frame) {
     double sum = 0.0, weight = 0.0;
     frame.max_error = inspection.farthest_crossing;
-    for (std::size_t t = 0; t < inspection.errors.size(); ++t) {
+    for (std::size_t t = 0; t < inspection.errors->size(); ++t) {
+        const TriangleError& error = (*inspection.errors)[t];
         const auto& [i, j, k] = mesh.carved.triangles[t];
         const double area =
             (mesh.vertices[j] - mesh.vertices[i]).cross(mesh.vertices[k] - mesh.vertices[i]).norm();
-        frame.max_error = std::max(frame.max_error, inspection.errors[t].largest);
-        sum += area * inspection.errors[t].mean_square;
+        frame.max_error = std::max(frame.max_error, error.largest);
+        sum += area * error.mean_square;
         weight += area;
     }
     frame.lost_crossings = inspection.lost_crossings;

@@ -1,6 +1,7 @@
 // One frame's mesh held against its surface, and what would mend it.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -23,7 +24,7 @@ struct FrameMesh {
 };
 
 struct Inspection {
-    std::vector<TriangleError> errors;      ///< Per triangle.
+    std::shared_ptr<const std::vector<TriangleError>> errors;  ///< Per triangle; the inspector has them, too.
     std::vector<Surface::Crossing> missed;  ///< Crossings farther from the mesh than the tolerance.
     double farthest_crossing = 0.0, crossings_mean_square = 0.0;  ///< Of those that were found.
     std::size_t lost_crossings = 0;                               ///< Those that were not.
@@ -66,14 +67,17 @@ private:
     const Surface& surface_;
     const SizingLimits& limits_;
     const CrossingGrid& crossings_;
-    std::optional<TriangleIndex> expected_;       // before the first inspection, of particles
-    std::vector<TriangleError> expected_errors_;  // of each
-    double reach_ = 0.0;                          // the largest of the distances, at most the cutoff
-    std::vector<Facet> facets_;                   // of the last inspection
-    std::vector<TriangleError> errors_;           // of each
-    std::vector<Facet> came_, went_;              // since the inspection before
-    std::vector<double> distances_;               // to the facets, per crossing; empty: not measured yet
-    std::vector<std::size_t> missed_;             // of the crossings
+    struct Expected {
+        TriangleIndex triangles;  // of particles
+        std::vector<TriangleError> errors;
+    };
+    std::optional<Expected> expected_;  // before the first inspection
+    double reach_ = 0.0;                // the largest of the distances, at most the cutoff
+    std::vector<Facet> facets_;         // of the last inspection
+    std::shared_ptr<const std::vector<TriangleError>> errors_;  // of each
+    std::vector<Facet> came_, went_;                            // since the inspection before
+    std::vector<double> distances_;  // to the facets, per crossing; empty: not measured yet
+    std::vector<int> missed_;        // of the crossings
     std::optional<LatticeSides> sides_;
     int looks_ = 0;  // at the topology
 };

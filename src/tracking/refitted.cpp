@@ -133,7 +133,7 @@ private:
 std::vector<char> poor_vertices(const FrameMesh& mesh, const Inspection& inspection, double tolerance) {
     std::vector<char> result(mesh.vertices.size(), 0);
     for (std::size_t t = 0; t < mesh.carved.triangles.size(); ++t)
-        if (inspection.errors[t].mean_square > kPoor * tolerance * kPoor * tolerance)
+        if ((*inspection.errors)[t].mean_square > kPoor * tolerance * kPoor * tolerance)
             for (const int v : mesh.carved.triangles[t]) result[v] = 1;
     return result;
 }
@@ -161,11 +161,12 @@ Inspection refit_within(FrameMesh& mesh, const Inspection& before, const std::ve
                 newly_missed.push_back(c.point);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bad.size(), 1024), [&](const auto& range) {
             for (std::size_t t = range.begin(); t < range.end(); ++t)
-                bad[t] = refitted.is_changed(t) &&
-                         (inspection.errors[t].largest > std::max(tolerance, before.errors[t].largest) ||
-                          refitted.is_spoilt(t) ||
-                          std::any_of(newly_missed.begin(), newly_missed.end(),
-                                      [&](const Vec3& place) { return refitted.is_near(t, place); }));
+                bad[t] =
+                    refitted.is_changed(t) &&
+                    ((*inspection.errors)[t].largest > std::max(tolerance, (*before.errors)[t].largest) ||
+                     refitted.is_spoilt(t) ||
+                     std::any_of(newly_missed.begin(), newly_missed.end(),
+                                 [&](const Vec3& place) { return refitted.is_near(t, place); }));
         });
         for (const auto& [t, u] : self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}))
             if (refitted.is_changed(t) || refitted.is_changed(u)) bad[t] = bad[u] = 1;  // not there before

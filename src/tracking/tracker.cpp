@@ -12,6 +12,7 @@
 #include <numeric>
 #include <unordered_set>
 
+#include "delaunay/spatial_order.h"
 #include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/error.h"
 #include "isotrack/meshing/blunting.h"
@@ -40,7 +41,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kColdRounds = 3, kWarmRounds = 2;
 constexpr int kMendingSweeps = 3;
 constexpr int kMostMendings = 3;
-constexpr double kFew = 0.02;  // of the particles: few enough to be added by certify, without relaxation
+constexpr double kAstray = 0.125;  // of the particles: so many newborn at the end of the arrays are too many
+constexpr double kFew = 0.02;      // of the particles: few enough to be added by certify, without relaxation
 /// How fast the population goes after the wanted spacing.
 struct Pace {
     PopulationBand band;
@@ -83,6 +85,7 @@ private:
 /// The triangles as particle indices, without those that stand on a midpoint.
 std::vector<Triangle> particle_triangles(const CarvedSurface& carved) {
     std::vector<Triangle> result;
+    result.reserve(carved.triangles.size());
     for (const Triangle& t : carved.triangles) {
         const Triangle p = {carved.particle[t[0]], carved.particle[t[1]], carved.particle[t[2]]};
         if (p[0] >= 0 && p[1] >= 0 && p[2] >= 0) result.push_back(p);
@@ -125,6 +128,16 @@ struct Memory {
             if (keep[t[0]] && keep[t[1]] && keep[t[2]])
                 triangles[kept++] = {number[t[0]], number[t[1]], number[t[2]]};
         triangles.resize(kept);
+    }
+    /// Entry i becomes that of order[i].
+    void reorder(const std::vector<int>& order) {
+        isotrack::reorder(evidence.error, order);
+        isotrack::reorder(evidence.thickness, order);
+        std::vector<int> place(order.size());
+        for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = static_cast<int>(i);
+        for (Triangle& t : triangles)
+            for (int& corner : t) corner = place[corner];
+        ring = ring_of(triangles, order.size());
     }
     /// For particles that were added: `parents` are the triangles that the last ones were born in; about the
     /// others nothing is known.
@@ -242,6 +255,7 @@ struct Tracker::Impl {
     std::unique_ptr<Tetrahedralisation> dt;
     CellLabels labels;
     std::vector<Id> in_dt;  // the particles whose DT it is
+    Id first_astray = 0;    // those born since the particles were arranged
     Memory memory;
 
     explicit Impl(const TrackerOptions& o) : options(o) {
@@ -299,6 +313,24 @@ struct Tracker::Impl {
         return std::move(guesses[winner]);
     }
 
+    /// Puts those next to each other in memory that are so in space: a third of the time of all that looks at
+    /// neighbours.
+    void arrange() {
+        std::vector<int> order(particles.size());
+        std::iota(order.begin(), order.end(), 0);
+        sort_along_curve(particles.position, order);
+        particles.reorder(order);
+        memory.grow(particles.size());
+        memory.reorder(order);
+        in_dt.clear();
+        first_astray = next_id;
+    }
+    bool astray() const {
+        const auto count = std::count_if(particles.id.begin(), particles.id.end(),
+                                         [&](Id id) { return id >= first_astray; });
+        return static_cast<double>(count) > kAstray * static_cast<double>(particles.size());
+    }
+
     /// Brings the particles to the new surface; drops those that find no way there or would change sides.
     std::size_t carry(const Surface& surface, const Motion& motion) {
         const std::size_t n = particles.size();
@@ -346,7 +378,7 @@ struct Tracker::Impl {
         if (in_dt.empty()) {
             dt->assign(particles.position);
         } else {
-            // Ids ascend, in the DT as among the particles.
+            // Those that are left are in their old order, the newborn behind them.
             std::size_t next = 0;
             for (std::size_t v = 0; v < in_dt.size(); ++v) {
                 if (next == particles.size() || particles.id[next] != in_dt[v]) {
@@ -380,6 +412,7 @@ struct Tracker::Impl {
         if (options.reconstruction == Reconstruction::Guided &&
             untangle(labels, cells, particles.position, surface, mesh.carved))
             mesh.carved = carve(cells, labels, particles.position);
+        mesh.vertices.reserve(mesh.carved.particle.size());
         std::size_t midpoint = 0;
         for (const int p : mesh.carved.particle)
             mesh.vertices.push_back(p >= 0 ? particles.position[p]
@@ -452,6 +485,7 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool w
             remember(mesh);
         }
         follow(surface, l, kAtFirst, frame);
+        if (!warm) arrange();
     }
 }
 
@@ -523,12 +557,14 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     const Id first_new = next_id;
     {
         const StageTimer timer(seconds, "carry");
+        if (warm && astray()) arrange();
         frame.lost = carry(surface, motion);
     }
     {
         const StageTimer timer(seconds, "cover");
         work->crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
         frame.seeded = cover(particles, surface, *work->crossings, l, options.seed, next_id);
+        if (!warm) arrange();
     }
     if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
@@ -557,7 +593,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         const StageTimer timer(seconds, "certify");
         if (options.method == Method::Paper) break;
         inspection = mending == 0 ? inspector->inspect(mesh) : inspector->inspect_both_ways(mesh);
-        memory.evidence.error = errors_at_particles(mesh, inspection.errors, particles.size());
+        memory.evidence.error = errors_at_particles(mesh, *inspection.errors, particles.size());
         Densifier once = make_densifier(surface, l, crossing_count);
         added = mend(mesh, inspection, surface, l, once);
         if (mending == kMostMendings ||
@@ -565,6 +601,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
             break;
         make_room(surface, frame);
     }
+    memory.take({}, particles.size());  // the last mesh is of no more use, and the most memory is needed now
     // A fitted mesh fails elsewhere than its particles do; of a DT built anew all cells are new.
     const bool refines = !options.fit && options.method == Method::Tolerance &&
                          options.reconstruction == Reconstruction::Guided &&

@@ -30,6 +30,7 @@
 #include "isotrack/error.h"
 #include "isotrack/io/sequence.h"
 #include "isotrack/io/vdb_file.h"
+#include "isotrack/memory.h"
 #include "isotrack/surface/level_set.h"
 #include "isotrack/surface/rasterise.h"
 #include "isotrack/surface/shapes.h"
@@ -213,6 +214,7 @@ int files(const FilesArguments& arguments) {
 
 int main(int argc, char** argv) {
     using namespace isotrack::bench;
+    isotrack::keep_little_memory();  // as the program isotrack does
     CLI::App app{"What frames cost as grids and meshes grow"};
     app.require_subcommand(1);
     int result = 0;

@@ -67,7 +67,7 @@ std::vector<double> crossing_distances(const std::vector<Vec3>& points,
 
 /// The same for some crossings alone: their entries of `distances`; the others stay.
 void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                        const CrossingGrid& grid, const std::vector<std::size_t>& some, double cutoff,
+                        const CrossingGrid& grid, const std::vector<int>& some, double cutoff,
                         std::vector<double>& distances);
 
 }  // namespace isotrack

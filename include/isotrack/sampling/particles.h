@@ -25,6 +25,8 @@ struct Particles {
     void add(const Vec3& p, const Vec3& n, double h, Id new_id, const Vec3& v = Vec3::Zero());
     /// Keeps, in order, the particles whose flag is set. `keep` has one entry per particle.
     void retain(const std::vector<char>& keep);
+    /// Particle i becomes that of order[i], which has every index once.
+    void reorder(const std::vector<int>& order);
     void clear();
 };
 

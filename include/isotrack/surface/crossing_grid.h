@@ -63,7 +63,7 @@ public:
     }
 
     /// Flags per column: it holds one of these crossings.
-    std::vector<char> columns_of(const std::vector<std::size_t>& some) const;
+    std::vector<char> columns_of(const std::vector<int>& some) const;
 
 private:
     /// A crossing in 16 bytes: there are more of them than of all else.
