@@ -33,6 +33,7 @@
 #include "tracking/inspection.h"
 #include "tracking/refinement.h"
 #include "tracking/refitted.h"
+#include "tracking/relabelling.h"
 
 namespace isotrack {
 namespace {
@@ -620,7 +621,10 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         }
         const StageTimer timer(seconds, "certify");
         const bool last = options.method == Method::Paper || round == kCertifyRounds;
-        const auto passes = [&] { return last || mend(mesh, inspection, surface, l, densifier) == 0; };
+        const auto passes = [&] {
+            return last || (mend(mesh, inspection, surface, l, densifier) == 0 &&
+                            relabel(labels, dt->cells(), mesh, inspection, particles, surface, l) == 0);
+        };
         inspection = inspector->inspect_both_ways(mesh);
         bool good = passes();
         if (good && options.fit && fitted.undo_crossing(mesh, particles.size())) {

@@ -1,0 +1,18 @@
+// Cells that a failing mesh shows to have the wrong label.
+#pragma once
+
+#include "isotrack/meshing/convection.h"
+#include "isotrack/sampling/particles.h"
+#include "isotrack/sampling/sizing.h"
+#include "tracking/inspection.h"
+
+namespace isotrack {
+
+/// Where nothing can be added any more that would break a triangle too far outside or inside of the surface,
+/// the cell behind it changes sides unless its centroid is clearly where its label says: a flat cell across a
+/// bay in the rim of a thin sheet. Returns how many changed.
+std::size_t relabel(CellLabels& labels, const Tetrahedra& cells, const FrameMesh& mesh,
+                    const Inspection& inspection, const Particles& particles, const Surface& surface,
+                    const SizingLimits& limits);
+
+}  // namespace isotrack
