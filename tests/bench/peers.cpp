@@ -42,7 +42,7 @@ struct Arguments {
     std::string frames, grid, tolerance = "0.5vx", distance = "0.3vx";
     double iso = 0.0;
     std::size_t triangles = 0, measure = 1;
-    bool csv = false, json = false;
+    bool remeshing = true, csv = false, json = false;
 };
 
 LevelSet read_level_set(const std::string& path, const Arguments& arguments) {
@@ -249,7 +249,9 @@ void run_peers(Frame& frame, const LevelSet& level_set, const Ours& ours, const 
     };
     const auto decimated = frame.attempt(
         "decimation", [&] { return on_uniform(timed([&] { return decimate(uniform.mesh, count); })); });
-    frame.attempt("isotropic_remeshing", [&] { return on_uniform(remesh_to_count(uniform.mesh, count)); });
+    if (arguments.remeshing)
+        frame.attempt("isotropic_remeshing",
+                      [&] { return on_uniform(remesh_to_count(uniform.mesh, count)); });
 
     const MeshMetrics plain = measure(ours.plain.mesh, level_set),
                       fitted = measure(ours.fitted.mesh, level_set);
@@ -344,6 +346,8 @@ int main(int argc, char** argv) {
     app.add_option("--triangles", arguments.triangles,
                    "For decimation and remeshing; 0: as many as isotrack --fit makes")
         ->capture_default_str();
+    app.add_flag("!--no-remeshing", arguments.remeshing,
+                 "Without isotropic remeshing, which may not come to an end on meshes with tiny joints");
     auto* csv = app.add_flag("--csv", arguments.csv, "CSV instead of an aligned table");
     app.add_flag("--json", arguments.json, "JSON instead of an aligned table")->excludes(csv);
     try {

@@ -23,7 +23,7 @@ for data in "$@"; do
     measure=3
     [ ! -f "$data" ] || measure=1
     code=0
-    "$programs/isotrack_peers" "$data" --measure "$measure" --csv >"$work/rows.csv" || code=$?
+    "$programs/isotrack_peers" "$data" --measure "$measure" --no-remeshing --csv >"$work/rows.csv" || code=$?
     if [ "$code" -ne 0 ] && [ "$code" -ne 3 ]; then
         echo "- ${name//[.#]*/}: not measured" >>"$work/missed"
         continue
