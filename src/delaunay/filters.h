@@ -2,7 +2,6 @@
 // exact ones.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
 #include "isotrack/delaunay/predicates.h"
@@ -11,8 +10,8 @@ namespace isotrack {
 
 namespace filters {
 
-/// A bound that is itself right needs products far from underflow.
-constexpr double kSmallest = 1e-280;
+/// Coordinates between which products of three neither overflow nor lose digits that matter to underflow.
+constexpr double kSmallest = 1e-97, kLargest = 1e102;
 
 /// Errors of the determinants below, over the sum of the sizes of their terms: half an ulp (2^-53) for every
 /// operation on the way from coordinates to sum, 8 for orientation and 16 for in_sphere; the rest is for the
@@ -29,7 +28,8 @@ inline int filtered_orientation(const Vec3& p, const Vec3& q, const Vec3& r, con
     const double det = yz * c.x() + zx * c.y() + xy * c.z();
     const Vec3 largest = a.cwiseAbs().cwiseMax(b.cwiseAbs()).cwiseMax(c.cwiseAbs());
     const double bound = filters::kOrientation * 6.0 * (largest.x() * largest.y() * largest.z());
-    if (bound > filters::kSmallest && std::abs(det) > bound) return det > 0.0 ? 1 : -1;
+    const bool in_range = largest.minCoeff() > filters::kSmallest && largest.maxCoeff() < filters::kLargest;
+    if (in_range && std::abs(det) > bound) return det > 0.0 ? 1 : -1;
     return orientation(p, q, r, s);
 }
 
@@ -46,7 +46,8 @@ inline bool filtered_in_sphere(const Vec3& p, const Vec3& q, const Vec3& r, cons
     const Four term = square * next(volume);
     const double det = (term[0] - term[1]) + (term[2] - term[3]), largest = square.maxCoeff();
     const double bound = filters::kInSphere * 4.62 * largest * largest * std::sqrt(largest);
-    if (bound > filters::kSmallest && std::abs(det) > bound) return det > 0.0;
+    const bool in_range = largest > filters::kSmallest && largest < filters::kLargest;  // of the squares
+    if (in_range && std::abs(det) > bound) return det > 0.0;
     return in_sphere(p, q, r, s, v);
 }
 

@@ -1,18 +1,20 @@
 #include "delaunay/incremental.h"
 
 #include <algorithm>
+#include <cassert>
 #include <numeric>
+#include <unordered_map>
 #include <utility>
 
 #include "delaunay/filters.h"
 #include "delaunay/spatial_order.h"
-#include "sampling/room.h"
+#include "room.h"
 
 namespace isotrack {
 namespace {
 
 constexpr int kNone = -1;
-constexpr char kUnseen = 0, kConflict = 1, kRim = 2;
+constexpr char kUnseen = 0, kConflict = 1, kRim = 2, kFree = 3;
 
 bool infinite(const std::array<int, 4>& v) {
     return (v[0] | v[1] | v[2] | v[3]) < 0;
@@ -94,7 +96,14 @@ void IncrementalDelaunay::insert(int vertex, int cell) {
     // rim, each of which two facets have, in opposite directions.
     corners_.clear();
     const std::size_t count = rim_.size() / 2 + 2;  // of vertices on the rim, by Euler's formula
-    edges_.resize(count * count);
+    constexpr std::size_t kMostInTable = 256;       // a vertex far outside sees half the hull
+    const bool in_table = count <= kMostInTable;
+    if (in_table) edges_.resize(count * count);
+    std::unordered_map<std::size_t, int> many;
+    const auto edge = [&](int from, int to) -> int& {
+        const std::size_t key = count * corner(from) + corner(to);
+        return in_table ? edges_[key] : many[key];
+    };
     fresh_.clear();
     for (const Facet& facet : rim_) {
         const int slot = new_slot(), outside = cells_.links[facet.cell][facet.k];
@@ -106,16 +115,13 @@ void IncrementalDelaunay::insert(int vertex, int cell) {
         cells_.links[outside >> 2][outside & 3] = Tetrahedra::link(slot, facet.k);
         marks_[outside >> 2] = kUnseen;
         const auto& f = Tetrahedra::kFacet[facet.k];
-        for (int j = 0; j < 3; ++j)
-            edges_[count * corner(v[f[j]]) + corner(v[f[(j + 1) % 3]])] =
-                Tetrahedra::link(slot, f[(j + 2) % 3]);
+        for (int j = 0; j < 3; ++j) edge(v[f[j]], v[f[(j + 1) % 3]]) = Tetrahedra::link(slot, f[(j + 2) % 3]);
     }
     for (std::size_t i = 0; i < rim_.size(); ++i) {
         const int slot = fresh_[i];
         const auto& v = cells_.vertices[slot];
         const auto& f = Tetrahedra::kFacet[rim_[i].k];
-        for (int j = 0; j < 3; ++j)
-            cells_.links[slot][f[(j + 2) % 3]] = edges_[count * corner(v[f[(j + 1) % 3]]) + corner(v[f[j]])];
+        for (int j = 0; j < 3; ++j) cells_.links[slot][f[(j + 2) % 3]] = edge(v[f[(j + 1) % 3]], v[f[j]]);
     }
     for (const int w : corners_) corner_of_[w + 1] = kNone;
     for (const int slot : freed_) free_slot(slot);
@@ -127,12 +133,13 @@ int IncrementalDelaunay::new_slot() {
         free_.pop_back();
         return slot;
     }
-    make_room(cells_.vertices);
-    make_room(cells_.links);
-    make_room(marks_);
+    ensure_room(cells_.vertices);
+    ensure_room(cells_.links);
+    ensure_room(marks_);
     cells_.vertices.emplace_back();
     cells_.links.emplace_back();
     marks_.push_back(kUnseen);
+    assert(cells_.size() <= Tetrahedra::kMostCells);
     return static_cast<int>(cells_.size()) - 1;
 }
 
@@ -208,7 +215,6 @@ void IncrementalDelaunay::build(std::vector<int>& chosen) {
         insert(v, cell);
         near = fresh_.front();
     }
-    arrange();
     if (!twice.empty()) {
         std::sort(twice.begin(), twice.end());
         const auto is_twice = [&](int v) { return std::binary_search(twice.begin(), twice.end(), v); };
@@ -217,7 +223,7 @@ void IncrementalDelaunay::build(std::vector<int>& chosen) {
 }
 
 /// Numbers the cells anew, by their first vertices: those that are near each other in memory are so in space
-/// as far as the points are. No slot is free then.
+/// as far as the points are.
 void IncrementalDelaunay::arrange() {
     const std::size_t slots = cells_.size();
     const auto key = [&](std::size_t c) {  // that of the infinite vertex is the largest
@@ -225,7 +231,7 @@ void IncrementalDelaunay::arrange() {
         return std::min(std::min(static_cast<unsigned>(v[0]), static_cast<unsigned>(v[1])),
                         std::min(static_cast<unsigned>(v[2]), static_cast<unsigned>(v[3])));
     };
-    for (const int slot : free_) marks_[slot] = kRim;
+    for (const int slot : free_) marks_[slot] = kFree;
     std::vector<int> next(points.size() + 1, 0);
     for (std::size_t c = 0; c < slots; ++c)
         if (marks_[c] == kUnseen) ++next[key(c) + 1];

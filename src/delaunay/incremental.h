@@ -1,7 +1,7 @@
 // The incremental construction of a DT.
 #pragma once
 
-#include <cstddef>
+#include <array>
 #include <vector>
 
 #include "isotrack/delaunay/tetrahedralisation.h"
@@ -21,9 +21,11 @@ public:
     const Tetrahedra& cells() const { return cells_; }
     bool empty() const { return cells_.size() == 0; }
 
-    /// The DT of the vertices in `chosen`, which come out in the order in which they went in, duplicates (of
-    /// which the first stays) left out; no cells when they span no volume. No slot is free.
+    /// The DT of the vertices in `chosen`, from which those are taken that are on the place of another; none
+    /// are taken and there are no cells when they span no volume.
     void build(std::vector<int>& chosen);
+    /// After `build`: leaves no slot free and makes cells neighbours in memory as far as their vertices are.
+    void arrange();
 
     /// A cell that has the place of a vertex in it or on it, infinite when it is outside the hull. `start`: a
     /// cell near by.
@@ -48,7 +50,6 @@ public:
 private:
     bool start(const std::vector<int>& order, std::array<int, 4>& first);
     int corner(int vertex);
-    void arrange();
 
     Tetrahedra cells_;
     std::vector<int> free_;

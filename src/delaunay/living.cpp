@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstdint>
 #include <numeric>
 #include <utility>
 
 #include "delaunay/filters.h"
-#include "sampling/room.h"
+#include "room.h"
 
 namespace isotrack {
 namespace {
@@ -40,17 +39,18 @@ FacetKey facet_of(const std::array<int, 4>& v, int k) {
 }  // namespace
 
 void LivingDelaunay::assign(const std::vector<Vec3>& points, const std::vector<char>& there) {
-    const Clocked clock(profile_.build);
     dt_.points = points;
     there_ = there.empty() ? std::vector<char>(points.size(), 1) : there;
     rebuild();
 }
 
 void LivingDelaunay::rebuild() {
+    const Clocked clock(profile_.build);
     std::vector<int> numbers;
     for (std::size_t v = 0; v < there_.size(); ++v)
         if (there_[v]) numbers.push_back(static_cast<int>(v));
     dt_.build(numbers);
+    dt_.arrange();
     size_ = numbers.size();
     std::fill(there_.begin(), there_.end(), 0);
     for (const int v : numbers) there_[v] = 1;
@@ -66,8 +66,9 @@ void LivingDelaunay::rebuild() {
 
 bool LivingDelaunay::insert(int number, const Vec3& p, int near) {
     if (number >= static_cast<int>(there_.size())) {
-        make_room(dt_.points);
-        make_room(a_cell_);
+        ensure_room(dt_.points);
+        ensure_room(there_);
+        ensure_room(a_cell_);
         dt_.points.resize(number + 1);
         there_.resize(number + 1, 0);
         a_cell_.resize(number + 1, -1);
@@ -95,11 +96,19 @@ void LivingDelaunay::place(int number, int cell) {
     for (const int slot : dt_.fresh())
         for (const int v : dt_.cells().vertices[slot])
             if (v >= 0) a_cell_[v] = slot;
-    changed_.insert(changed_.end(), dt_.fresh().begin(), dt_.fresh().end());
-    changed_.insert(changed_.end(), dt_.freed().begin(), dt_.freed().end());
+    note(dt_.fresh());
+    note(dt_.freed());
     recent_ = dt_.fresh().front();
     there_[number] = 1;
     ++size_;
+}
+
+/// Nobody may ever ask which slots changed.
+void LivingDelaunay::note(const std::vector<int>& slots) {
+    changed_.insert(changed_.end(), slots.begin(), slots.end());
+    if (changed_.size() <= 2 * dt_.cells().size()) return;
+    std::sort(changed_.begin(), changed_.end());
+    changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
 }
 
 void LivingDelaunay::remove(int number) {
@@ -163,13 +172,14 @@ bool LivingDelaunay::fill_star(int number) {
             slot[next] = 0;
         }
 
-    changed_.insert(changed_.end(), star.begin(), star.end());
+    note(star);
     for (const int c : star) dt_.free_slot(c);
-    for (const int c : taken) slot[c] = dt_.new_slot();
+    std::vector<int> fresh;
+    for (const int c : taken) fresh.push_back(slot[c] = dt_.new_slot());
+    note(fresh);
     recent_ = slot[taken.front()];
     for (const int c : taken) {
         const int s = slot[c];
-        changed_.push_back(s);
         for (int k = 0; k < 4; ++k) {
             const int v = filling.vertices[c][k];
             cells.vertices[s][k] = v < 0 ? Tetrahedra::kInfinite : link[v];
@@ -207,6 +217,9 @@ void LivingDelaunay::relocate(int number, const Vec3& p) {
     }
     // Under a number of its own until the old one has gone.
     const int moved = static_cast<int>(there_.size());
+    ensure_room(dt_.points);
+    ensure_room(there_);
+    ensure_room(a_cell_);
     dt_.points.push_back(p);
     there_.push_back(0);
     a_cell_.push_back(-1);

@@ -8,17 +8,19 @@
 
 namespace isotrack {
 
-/// Not for concurrent use.
+/// Changes cost by what they change, but for those that take a DT to or from points that span no volume and
+/// the removal of one whose neighbours span none: these build anew. Not for concurrent use.
 class LivingDelaunay {
 public:
     /// Starts anew with vertex i at points[i], where `there` (all when empty) is set; of several points on
-    /// one place one has a vertex.
+    /// one place one has a vertex, or all while there are no cells.
     void assign(const std::vector<Vec3>& points, const std::vector<char>& there = {});
     /// False when another vertex is on that very place; the number has then no vertex. `near`: the number of
     /// a vertex close by, or -1.
     bool insert(int number, const Vec3& p, int near);
     void remove(int number);
-    /// Inserts at p, then removes from where it was: faster than the other way round (the paper's 4.3).
+    /// Inserts at p, then removes from where it was: faster than the other way round (the paper's 4.3). When
+    /// another vertex is on that very place the number has none any more.
     void relocate(int number, const Vec3& p);
     bool has(int number) const { return number < static_cast<int>(there_.size()) && there_[number]; }
     std::size_t size() const { return size_; }  ///< Vertices.
@@ -39,7 +41,7 @@ public:
 
     /// Slots that hold no cell any more have only infinite vertices and are their own neighbours.
     const Tetrahedra& cells() const { return dt_.cells(); }
-    /// The slots of `cells()` written since the last call, ascending; `assign` writes all.
+    /// The slots of `cells()` written since the last call, ascending; building anew writes all.
     std::vector<int> take_changed();
 
     const UpdateProfile& profile() const { return profile_; }  ///< Since the first `assign`.
@@ -48,6 +50,7 @@ private:
     void rebuild();
     const std::vector<int>& star_of(int number) const;
     void place(int number, int cell);
+    void note(const std::vector<int>& slots);
     void take_out(int number);
     bool fill_star(int number);
 

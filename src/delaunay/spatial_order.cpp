@@ -1,13 +1,10 @@
 #include "delaunay/spatial_order.h"
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/hilbert_sort.h>
 #include <CGAL/spatial_sort.h>
 
 namespace isotrack {
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 /// Points as CGAL sorts them: by coordinates, looked up by number.
 struct ByNumber {

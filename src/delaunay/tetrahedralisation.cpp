@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "delaunay/living.h"
-#include "sampling/room.h"
+#include "room.h"
 
 namespace isotrack {
 namespace {
@@ -48,8 +48,9 @@ protected:
     virtual void assigned() {}
 
     int note_insert(const Vec3& point) {
-        make_room(points_);
+        ensure_room(points_);
         points_.push_back(point);
+        ensure_room(there_);
         there_.push_back(1);
         return static_cast<int>(points_.size()) - 1;
     }
@@ -225,6 +226,7 @@ Tetrahedra tetrahedralise(const std::vector<Vec3>& points) {
     std::vector<int> all(points.size());
     std::iota(all.begin(), all.end(), 0);
     dt.build(all);
+    dt.arrange();
     return std::move(dt.slots());
 }
 

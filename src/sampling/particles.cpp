@@ -1,13 +1,13 @@
 #include "isotrack/sampling/particles.h"
 
+#include "room.h"
 #include "sampling/compact.h"
-#include "sampling/room.h"
 
 namespace isotrack {
 
 void Particles::add(const Vec3& p, const Vec3& n, double h, Id new_id, const Vec3& v) {
     const auto append = [](auto& values, const auto& value) {
-        make_room(values);
+        ensure_room(values);
         values.push_back(value);
     };
     append(position, p);

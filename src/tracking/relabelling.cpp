@@ -3,9 +3,11 @@
 #include "tracking/failing.h"
 
 namespace isotrack {
+namespace {
 
-constexpr double kUnclear =
-    0.2;  // of the tolerance: a centroid that near does not say on which side its cell is
+constexpr double kUnclear = 0.2;  // of the tolerance: a centroid so near does not tell the side
+
+}  // namespace
 
 std::size_t relabel(CellLabels& labels, const Tetrahedra& cells, const FrameMesh& mesh,
                     const Inspection& inspection, const Particles& particles, const Surface& surface,

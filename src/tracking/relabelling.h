@@ -8,9 +8,10 @@
 
 namespace isotrack {
 
-/// Where nothing can be added any more that would break a triangle too far outside or inside of the surface,
-/// the cell behind it changes sides unless its centroid is clearly where its label says: a flat cell across a
-/// bay in the rim of a thin sheet. Returns how many changed.
+/// For when nothing can be added any more that would break a triangle too far from the surface, such as that
+/// of a flat cell across a bay in the rim of a thin sheet: the cell on its wrong side, behind it when it is
+/// outside, else in front of it, changes sides, unless its centroid is clearly where its label says. Returns
+/// how many changed.
 std::size_t relabel(CellLabels& labels, const Tetrahedra& cells, const FrameMesh& mesh,
                     const Inspection& inspection, const Particles& particles, const Surface& surface,
                     const SizingLimits& limits);

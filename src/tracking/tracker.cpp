@@ -59,6 +59,7 @@ constexpr double kLeastEdge = 0.5, kLargestEdge = 40.0;  // details
 constexpr double kCrossingsApart = 0.5;  // details: what lies between crossings is found from the triangles
 constexpr double kBandShare = 0.8;       // of the reach: interpolated values are right up to there
 constexpr int kCertifyRounds = 24;
+constexpr int kMostRelabellings = 4;  // what changes sides might go on changing them
 // Particles that are added at most, at a tolerance of half a detail. A clean level set takes a quarter of
 // that; one with holes in its band would take more than it has lattice edges.
 constexpr double kMostPerCrossing = 0.5;
@@ -314,8 +315,8 @@ struct Tracker::Impl {
         return std::move(guesses[winner]);
     }
 
-    /// Puts those next to each other in memory that are so in space: a third of the time of all that looks at
-    /// neighbours.
+    /// Puts those next to each other in memory that areso in space: what looks at neighbours takes a third
+    /// less time then.
     void arrange() {
         std::vector<int> order(particles.size());
         std::iota(order.begin(), order.end(), 0);
@@ -609,6 +610,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
                          options.delaunay != UpdateStrategy::Rebuild;
     // The topology, which takes longer to look at, is looked at when all else passes.
     Densifier densifier = make_densifier(surface, l, crossing_count);
+    int relabellings = 0;
     for (int round = 0;; ++round) {
         if (round > 0 || added > 0) {
             tetrahedralise(false, seconds);
@@ -622,8 +624,12 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         const StageTimer timer(seconds, "certify");
         const bool last = options.method == Method::Paper || round == kCertifyRounds;
         const auto passes = [&] {
-            return last || (mend(mesh, inspection, surface, l, densifier) == 0 &&
-                            relabel(labels, dt->cells(), mesh, inspection, particles, surface, l) == 0);
+            if (last) return true;
+            if (mend(mesh, inspection, surface, l, densifier) > 0) return false;
+            if (options.reconstruction != Reconstruction::Guided || relabellings == kMostRelabellings)
+                return true;
+            ++relabellings;
+            return relabel(labels, dt->cells(), mesh, inspection, particles, surface, l) == 0;
         };
         inspection = inspector->inspect_both_ways(mesh);
         bool good = passes();

@@ -73,6 +73,9 @@ std::vector<std::pair<std::string, std::vector<Vec3>>> clouds() {
     result.emplace_back("sphere of floats", points);
     for (Vec3& p : points) p = p.normalized() * (1.0 + 0.2 * std::sin(5.0 * p.x()) * std::sin(6.0 * p.y()));
     result.emplace_back("bumps", points);
+    for (const Vec3& far : {Vec3(9, 1, 2), Vec3(-7, 3, 1), Vec3(0, 20, 1), Vec3(1, -3, 8)})
+        points.push_back(far);
+    result.emplace_back("bumps from afar", points);
     points.clear();
     for (int i = 0; i < 9 * 9 * 9; ++i) points.emplace_back(i / 81, i / 9 % 9, i % 9);
     result.emplace_back("lattice", points);

@@ -114,6 +114,27 @@ TEST(Cover, FindsADropOfASingleVoxel) {
               4u);  // enough for a tetrahedron
 }
 
+TEST(Particles, ComeAndGoAndChangePlacesWithAllThatBelongsToThem) {
+    Particles particles;
+    for (int i = 0; i < 5; ++i) {
+        particles.add(Vec3(i, 0, 0), Vec3(0, i, 0), 0.1 * i, 10 + i, Vec3(0, 0, i));
+        particles.stretch.back() = Vec3(i, i, 0);
+    }
+    particles.retain({1, 0, 1, 1, 1});
+    particles.reorder({2, 0, 3, 1});
+    ASSERT_EQ(particles.size(), 4u);
+    const int expected[] = {3, 0, 4, 2};
+    for (int k = 0; k < 4; ++k) {
+        const int i = expected[k];
+        EXPECT_EQ(particles.position[k], Vec3(i, 0, 0));
+        EXPECT_EQ(particles.normal[k], Vec3(0, i, 0));
+        EXPECT_EQ(particles.spacing[k], 0.1 * i);
+        EXPECT_EQ(particles.stretch[k], Vec3(i, i, 0));
+        EXPECT_EQ(particles.id[k], 10 + i);
+        EXPECT_EQ(particles.velocity[k], Vec3(0, 0, i));
+    }
+}
+
 TEST(Cover, MendsOnlyTheHole) {
     const auto surface = shapes::sphere({0.01, 0.02, 0.03}, 1.0, 0.05);
     Particles particles;

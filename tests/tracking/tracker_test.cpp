@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <random>
 #include <set>
 #include <vector>
@@ -221,6 +222,30 @@ TEST(Tracker, NeverReusesAnId) {
             }
         alive = now;
     }
+}
+
+TEST(Tracker, KeepsIdsWhereTheyAreThroughManyBirths) {
+    Tracker tracker(with_tolerance(0.004));
+    constexpr double kGrowth = 0.06;
+    std::map<Id, Vec3> before;
+    std::size_t born = 0, first = 0;
+    for (int f = 0; f < 10; ++f) {
+        born += tracker.advance(*sphere_at({0, 0, 0}, 0.5 + kGrowth * f)).born;
+        const Particles& particles = tracker.particles();
+        if (f == 0) first = born;
+        std::map<Id, Vec3> now;
+        double farthest = 0.0, mean_spacing = 0.0;
+        for (std::size_t i = 0; i < particles.size(); ++i) {
+            now[particles.id[i]] = particles.position[i];
+            mean_spacing += particles.spacing[i] / static_cast<double>(particles.size());
+            const auto old = before.find(particles.id[i]);
+            if (old != before.end())
+                farthest = std::max(farthest, (particles.position[i] - old->second).norm());
+        }
+        EXPECT_LT(farthest, kGrowth + mean_spacing) << f;
+        before = now;
+    }
+    EXPECT_GT(born, first + first / 2);  // so many that the particles do not keep their order
 }
 
 TEST(Tracker, KeepsMostIdsWhenTheMotionIsSlow) {

@@ -24,6 +24,8 @@ struct Tetrahedra {
                                                ///< cell n and the index m in it of the vertex across.
 
     std::size_t size() const { return vertices.size(); }
+    static constexpr std::size_t kMostCells = std::size_t{1} << 29;  ///< That links can tell apart.
+    /// An entry of `links`.
     static int link(int cell, int m) { return 4 * cell + m; }
     /// The cell across the facet opposite vertex k.
     int neighbour(int cell, int k) const { return links[cell][k] >> 2; }
