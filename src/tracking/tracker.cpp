@@ -1,21 +1,16 @@
 #include "isotrack/tracking/tracker.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/task_group.h>
 
 #include <algorithm>
-#include <array>
-#include <chrono>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numeric>
 #include <unordered_set>
 
 #include "delaunay/spatial_order.h"
 #include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/error.h"
-#include "isotrack/meshing/blunting.h"
 #include "isotrack/meshing/convection.h"
 #include "isotrack/meshing/manifold.h"
 #include "isotrack/meshing/open_border.h"
@@ -28,12 +23,14 @@
 #include "isotrack/sampling/sizing.h"
 #include "sampling/compact.h"
 #include "surface/float_precision.h"
-#include "surface/thread_probes.h"
+#include "tracking/carry.h"
 #include "tracking/fitted.h"
+#include "tracking/frame_work.h"
 #include "tracking/inspection.h"
+#include "tracking/last_mesh.h"
 #include "tracking/refinement.h"
-#include "tracking/refitted.h"
 #include "tracking/relabelling.h"
+#include "tracking/stage_timer.h"
 
 namespace isotrack {
 namespace {
@@ -65,95 +62,8 @@ constexpr int kMostRelabellings = 4;  // what changes sides might go on changing
 constexpr double kMostPerCrossing = 0.5;
 constexpr std::size_t kMostAnyway = 1000;
 constexpr double kFitWideExponent = 0.5;
-constexpr int kBluntRounds = 3, kBluntPasses = 12;
-constexpr double kChangedShare = 0.96;  // of the tolerance, for the triangles they or the refit change
 constexpr double kAngleFloor = 2.0;     // details: sharp edges are as round as they make them
 constexpr double kLeastSpacing = 5e-4;  // resolutions: a single node inside may leave no more than that
-
-/// Adds the time from its construction to its destruction to a stage.
-class StageTimer {
-public:
-    StageTimer(std::map<std::string, double>& seconds, const char* stage)
-        : total_(seconds[stage]), start_(std::chrono::steady_clock::now()) {}
-    ~StageTimer() {
-        total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    }
-
-private:
-    double& total_;
-    std::chrono::steady_clock::time_point start_;
-};
-
-/// The triangles as particle indices, without those that stand on a midpoint.
-std::vector<Triangle> particle_triangles(const CarvedSurface& carved) {
-    std::vector<Triangle> result;
-    result.reserve(carved.triangles.size());
-    for (const Triangle& t : carved.triangles) {
-        const Triangle p = {carved.particle[t[0]], carved.particle[t[1]], carved.particle[t[2]]};
-        if (p[0] >= 0 && p[1] >= 0 && p[2] >= 0) result.push_back(p);
-    }
-    return result;
-}
-
-/// The distance to the nearest Delaunay neighbour that faces the other way.
-std::vector<double> thickness_of(const Particles& particles, const Tetrahedra& cells) {
-    std::vector<double> th(particles.size(), std::numeric_limits<double>::infinity());
-    for (const auto& cell : cells.vertices)
-        for (int a = 0; a < 4; ++a)
-            for (int b = a + 1; b < 4; ++b) {
-                const int i = cell[a], j = cell[b];
-                if (i < 0 || j < 0 || !(particles.normal[i].dot(particles.normal[j]) < 0.0)) continue;
-                const double apart = (particles.position[i] - particles.position[j]).norm();
-                th[i] = std::min(th[i], apart);
-                th[j] = std::min(th[j], apart);
-            }
-    return th;
-}
-
-/// What the last mesh says about its particles; entries follow those of the particles.
-struct Memory {
-    Adjacency ring;  // along the mesh
-    std::vector<Triangle> triangles;
-    SizingEvidence evidence;
-
-    void take(std::vector<Triangle> of_mesh, std::size_t count) {
-        triangles = std::move(of_mesh);
-        ring = ring_of(triangles, count);
-    }
-    void retain(const std::vector<char>& keep) {
-        compact(evidence.error, keep);
-        compact(evidence.thickness, keep);
-        ring = ring.restricted(keep);
-        const std::vector<int> number = numbers_after(keep);
-        std::size_t kept = 0;
-        for (const Triangle& t : triangles)
-            if (keep[t[0]] && keep[t[1]] && keep[t[2]])
-                triangles[kept++] = {number[t[0]], number[t[1]], number[t[2]]};
-        triangles.resize(kept);
-    }
-    /// Entry i becomes that of order[i].
-    void reorder(const std::vector<int>& order) {
-        isotrack::reorder(evidence.error, order);
-        isotrack::reorder(evidence.thickness, order);
-        std::vector<int> place(order.size());
-        for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = static_cast<int>(i);
-        for (Triangle& t : triangles)
-            for (int& corner : t) corner = place[corner];
-        ring = ring_of(triangles, order.size());
-    }
-    /// For particles that were added: `parents` are the triangles that the last ones were born in; about the
-    /// others nothing is known.
-    void grow(std::size_t count, const std::vector<Triangle>& parents = {}) {
-        for (std::size_t k = 0; k < parents.size(); ++k) {
-            const auto& [a, b, c] = parents[k];
-            const int i = static_cast<int>(ring.size() + k);
-            triangles.insert(triangles.end(), {{a, b, i}, {b, c, i}, {c, a, i}});
-        }
-        ring = ring.extended(parents, count);
-        evidence.error.resize(count, -1.0);
-        evidence.thickness.resize(count, std::numeric_limits<double>::infinity());
-    }
-};
 
 void round_to_float(Particles& particles) {
     for (Vec3& p : particles.position) p = to_float_precision(p);
@@ -171,83 +81,6 @@ double detail_of(const TrackerOptions& options, const Surface& surface) {
     return std::max(surface.resolution(), enough);
 }
 
-/// A frame in the making.
-struct Work {
-    const Surface& surface;
-    const SizingLimits limits;
-    TrackedFrame frame;
-    FrameMesh mesh;
-    std::optional<CrossingGrid> crossings;
-    std::optional<Inspector> inspector;  // of this mesh
-    Inspection inspection;
-
-    /// The vertices that stand for a particle alone: copies stay where they are.
-    std::vector<char> movable() const {
-        const auto& particle = mesh.carved.particle;
-        const int last = particle.empty() ? -1 : *std::max_element(particle.begin(), particle.end());
-        std::vector<int> vertex(last + 1, -1);
-        std::vector<char> result;
-        for (const int p : particle) {
-            const int v = static_cast<int>(result.size());
-            result.push_back(p >= 0 && vertex[p] < 0);
-            if (p < 0) continue;
-            if (vertex[p] >= 0) result[vertex[p]] = 0;
-            vertex[p] = v;
-        }
-        return result;
-    }
-
-    /// Fits the mesh once more, with other diagonals, as far as it goes on reaching all it reached.
-    void refit() {
-        const StageTimer timer(frame.seconds, "fit");
-        inspection =
-            refit_within(mesh, inspection, movable(), surface, kChangedShare * limits.tolerance, *inspector);
-    }
-
-    /// Makes sharp triangles blunter where the mesh goes on reaching all it reached. The particles stay where
-    /// they are: the next frame's triangles are others.
-    void blunt() {
-        const StageTimer timer(frame.seconds, "blunt");
-        Blunter blunter(mesh.vertices, mesh.carved.triangles, movable(), surface, *crossings,
-                        kChangedShare * limits.tolerance);
-        const auto missed = [&] {
-            std::vector<std::array<double, 3>> places;
-            for (const auto& c : inspection.missed) places.push_back({c.point.x(), c.point.y(), c.point.z()});
-            std::sort(places.begin(), places.end());
-            return places;
-        };
-        const auto before = missed();
-        // What is missed now but was not before; nothing where not more is missed.
-        const auto newly_missed = [&] {
-            for (const Blunting& change : blunter.changes())
-                if (change.vertex < 0)
-                    for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
-            inspection = inspector->inspect_both_ways(mesh);
-            std::vector<Vec3> places;
-            if (inspection.missed.size() <= before.size()) return places;
-            for (const auto& p : missed())
-                if (!std::binary_search(before.begin(), before.end(), p))
-                    places.emplace_back(p[0], p[1], p[2]);
-            return places;
-        };
-        bool again = true;
-        for (int round = 0; again && round < kBluntRounds && blunter.run(kBluntPasses); ++round) {
-            again = false;
-            for (auto places = newly_missed(); !places.empty(); places = newly_missed())
-                again = blunter.undo_near(places, limits.tolerance);
-        }
-    }
-
-    TrackedFrame finish(const TrackerOptions& options) {
-        if (options.method != Method::Paper) blunt();
-        if (options.method != Method::Paper && options.fit) refit();
-        report(mesh, inspection, limits, frame);
-        frame.mesh.points = std::move(mesh.vertices);
-        frame.mesh.triangles = std::move(mesh.carved.triangles);
-        return std::move(frame);
-    }
-};
-
 }  // namespace
 
 struct Tracker::Impl {
@@ -258,7 +91,7 @@ struct Tracker::Impl {
     CellLabels labels;
     std::vector<Id> in_dt;  // the particles whose DT it is
     Id first_astray = 0;    // those born since the particles were arranged
-    Memory memory;
+    LastMesh last_mesh;
 
     explicit Impl(const TrackerOptions& o) : options(o) {
         if (!(o.tolerance > 0.0))
@@ -280,50 +113,15 @@ struct Tracker::Impl {
         return as_in_paper ? UpdateStrategy::Lazy : options.delaunay;
     }
 
-    /// Where each particle is expected on the new surface. A velocity field may be in a unit nobody knows and
-    /// a motion may have turned round, so the guesses compete: the velocity field, the last displacement,
-    /// standing still. The one that lands nearest to the surface wins, by its median over the particles; an
-    /// earlier one wins unless a later one is clearly better.
-    std::vector<Vec3> expected_positions(const Surface& surface, const Motion& motion) const {
-        constexpr std::size_t kVoters = 2000;
-        constexpr double kClearly = 0.8;
-        const std::size_t n = particles.size(), step = 1 + n / kVoters;
-        std::vector<std::vector<Vec3>> guesses;
-        if (motion) {
-            guesses.emplace_back(n);
-            tbb::parallel_for(std::size_t{0}, n,
-                              [&](std::size_t i) { guesses.back()[i] = motion(particles.position[i]); });
-        }
-        guesses.emplace_back(n);
-        for (std::size_t i = 0; i < n; ++i) guesses.back()[i] = particles.position[i] + particles.velocity[i];
-        guesses.push_back(particles.position);
-        const auto probe = surface.probe();
-        std::size_t winner = 0;
-        double least = std::numeric_limits<double>::infinity();
-        for (std::size_t g = 0; g < guesses.size(); ++g) {
-            std::vector<double> distances;
-            for (std::size_t i = 0; i < n; i += step)
-                distances.push_back(std::abs(probe->value(guesses[g][i])));
-            if (distances.empty()) break;
-            const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-            std::nth_element(distances.begin(), middle, distances.end());
-            if (*middle < kClearly * least) {
-                least = *middle;
-                winner = g;
-            }
-        }
-        return std::move(guesses[winner]);
-    }
-
-    /// Puts those next to each other in memory that areso in space: what looks at neighbours takes a third
+    /// Puts those next to each other in memory that are so in space: what looks at neighbours takes a third
     /// less time then.
     void arrange() {
         std::vector<int> order(particles.size());
         std::iota(order.begin(), order.end(), 0);
         sort_along_curve(particles.position, order);
         particles.reorder(order);
-        memory.grow(particles.size());
-        memory.reorder(order);
+        last_mesh.grow(particles.size());
+        last_mesh.reorder(order);
         in_dt.clear();
         first_astray = next_id;
     }
@@ -331,34 +129,6 @@ struct Tracker::Impl {
         const auto count = std::count_if(particles.id.begin(), particles.id.end(),
                                          [&](Id id) { return id >= first_astray; });
         return static_cast<double>(count) > kAstray * static_cast<double>(particles.size());
-    }
-
-    /// Brings the particles to the new surface; drops those that find no way there or would change sides.
-    std::size_t carry(const Surface& surface, const Motion& motion) {
-        const std::size_t n = particles.size();
-        std::vector<char> keep(n, 0);
-        const std::vector<Vec3> expected = expected_positions(surface, motion);
-        ThreadProbes probes(surface);
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 128), [&](const auto& range) {
-            Surface::Probe& probe = probes.local();
-            for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                const Vec3 old = particles.position[i];
-                for (const Vec3& start : {expected[i], old}) {
-                    const auto p = probe.project(start);
-                    if (!p) continue;
-                    const Vec3 n_new = probe.normal(*p);
-                    if (!(n_new.dot(particles.normal[i]) > 0.0)) continue;
-                    particles.position[i] = *p;
-                    particles.normal[i] = n_new;
-                    particles.velocity[i] = *p - old;
-                    keep[i] = 1;
-                    break;
-                }
-            }
-        });
-        particles.retain(keep);
-        memory.retain(keep);
-        return n - particles.size();
     }
 
     /// Brings the DT to the particles. `moved`: what was known of its cells does not hold any more.
@@ -456,7 +226,6 @@ struct Tracker::Impl {
 
     void follow(const Surface& surface, const SizingLimits& l, const Pace& pace, TrackedFrame& frame);
     void make_room(const Surface& surface, TrackedFrame& frame);
-    void remember(const FrameMesh& mesh);
     void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     Finish begin(const Surface& surface, const Motion& motion);
@@ -481,10 +250,10 @@ void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool w
         }
         {
             const StageTimer timer(seconds, "size");
-            memory.evidence.error = errors_at_particles(
+            last_mesh.evidence.error = errors_at_particles(
                 mesh, triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps),
                 particles.size());
-            remember(mesh);
+            last_mesh.take(mesh.carved, particles, dt->cells());
         }
         follow(surface, l, kAtFirst, frame);
         if (!warm) arrange();
@@ -496,8 +265,8 @@ void Tracker::Impl::make_room(const Surface& surface, TrackedFrame& frame) {
     tetrahedralise(false, frame.seconds);
     const FrameMesh mesh = carve_mesh(surface, frame.seconds);
     const StageTimer timer(frame.seconds, "relax");
-    memory.take(particle_triangles(mesh.carved), particles.size());
-    frame.sweeps += relax(particles, memory.ring.squared(), surface, kMendingSweeps);
+    last_mesh.take(particle_triangles(mesh.carved), particles.size());
+    frame.sweeps += relax(particles, last_mesh.ring.squared(), surface, kMendingSweeps);
 }
 
 /// Spacing, births and deaths, then sweeps, by what the last mesh knows: no DT is needed.
@@ -505,26 +274,20 @@ void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const 
                            TrackedFrame& frame) {
     {
         const StageTimer timer(frame.seconds, "size");
-        memory.grow(particles.size());
+        last_mesh.grow(particles.size());
         SizingLimits paced = l;
         paced.thinning = pace.thinning;
-        update_spacing(particles, memory.ring, memory.evidence, paced);
+        update_spacing(particles, last_mesh.ring, last_mesh.evidence, paced);
     }
     const StageTimer timer(frame.seconds, "relax");
-    auto keep = uncrowded(particles, memory.ring, pace.band);
+    auto keep = uncrowded(particles, last_mesh.ring, pace.band);
     const std::vector<Triangle> parents =
-        fill_sparse(particles, memory.triangles, memory.ring, surface, next_id, pace.band);
-    memory.grow(particles.size(), parents);
+        fill_sparse(particles, last_mesh.triangles, last_mesh.ring, surface, next_id, pace.band);
+    last_mesh.grow(particles.size(), parents);
     keep.resize(particles.size(), 1);
     particles.retain(keep);
-    memory.retain(keep);
-    frame.sweeps += relax(particles, memory.ring.squared(), surface, pace.sweeps);
-}
-
-void Tracker::Impl::remember(const FrameMesh& mesh) {
-    memory.take(particle_triangles(mesh.carved), particles.size());
-    memory.evidence.error.resize(particles.size(), -1.0);
-    memory.evidence.thickness = thickness_of(particles, dt->cells());
+    last_mesh.retain(keep);
+    frame.sweeps += relax(particles, last_mesh.ring.squared(), surface, pace.sweeps);
 }
 
 void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm,
@@ -544,7 +307,7 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
 
 Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motion) {
     const auto work =
-        std::make_shared<Work>(Work{surface, sizing_limits(options, surface), {}, {}, {}, {}, {}});
+        std::make_shared<FrameWork>(FrameWork{surface, sizing_limits(options, surface), {}, {}, {}, {}, {}});
     const SizingLimits& l = work->limits;
     TrackedFrame& frame = work->frame;
     FrameMesh& mesh = work->mesh;
@@ -560,7 +323,10 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     {
         const StageTimer timer(seconds, "carry");
         if (warm && astray()) arrange();
-        frame.lost = carry(surface, motion);
+        const std::vector<char> found = carry(particles, surface, motion);
+        particles.retain(found);
+        last_mesh.retain(found);
+        frame.lost = static_cast<std::size_t>(std::count(found.begin(), found.end(), 0));
     }
     {
         const StageTimer timer(seconds, "cover");
@@ -588,14 +354,14 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         inspector.emplace(surface, l, *work->crossings);
         std::function<void()> measure_expected;
         if (!options.fit && options.method != Method::Paper)
-            measure_expected = [&] { inspector->expect(particles.position, memory.triangles); };
+            measure_expected = [&] { inspector->expect(particles.position, last_mesh.triangles); };
         tetrahedralise(true, seconds, measure_expected);
         fitted = {};
         make_mesh();
         const StageTimer timer(seconds, "certify");
         if (options.method == Method::Paper) break;
         inspection = mending == 0 ? inspector->inspect(mesh) : inspector->inspect_both_ways(mesh);
-        memory.evidence.error = errors_at_particles(mesh, *inspection.errors, particles.size());
+        last_mesh.evidence.error = errors_at_particles(mesh, *inspection.errors, particles.size());
         Densifier once = make_densifier(surface, l, crossing_count);
         added = mend(mesh, inspection, surface, l, once);
         if (mending == kMostMendings ||
@@ -603,7 +369,8 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
             break;
         make_room(surface, frame);
     }
-    memory.take({}, particles.size());  // the last mesh is of no more use, and the most memory is needed now
+    last_mesh.take({},
+                   particles.size());  // the last mesh is of no more use, and the most memory is needed now
     // A fitted mesh fails elsewhere than its particles do; of a DT built anew all cells are new.
     const bool refines = !options.fit && options.method == Method::Tolerance &&
                          options.reconstruction == Reconstruction::Guided &&
@@ -643,7 +410,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         }
     }
     frame.relocated += dt->profile().relocated - relocated;
-    remember(mesh);
+    last_mesh.take(mesh.carved, particles, dt->cells());
     {
         const StageTimer timer(seconds, "certify");
         remove_specks(mesh, inspection, *inspector, l);

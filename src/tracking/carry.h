@@ -1,0 +1,21 @@
+// From the surface of one frame to that of the next.
+#pragma once
+
+#include <vector>
+
+#include "isotrack/sampling/particles.h"
+#include "isotrack/surface/surface.h"
+#include "isotrack/tracking/tracker.h"
+
+namespace isotrack {
+
+/// Brings the particles to the new surface and sets their velocities. Returns a flag per particle: 0 for one
+/// that finds no way there or would change sides, and stays where it was.
+///
+/// A velocity field may be in a unit nobody knows and a motion may have turned round, so three guesses of
+/// where the particles go compete: `motion` if there is one, the last displacement, standing still. The one
+/// that lands nearest to the surface wins, by its median over the particles; an earlier one wins unless a
+/// later one is clearly better.
+std::vector<char> carry(Particles& particles, const Surface& surface, const Tracker::Motion& motion);
+
+}  // namespace isotrack

@@ -1,0 +1,83 @@
+#include "tracking/frame_work.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "isotrack/meshing/blunting.h"
+#include "tracking/refitted.h"
+#include "tracking/stage_timer.h"
+
+namespace isotrack {
+namespace {
+
+constexpr int kBluntRounds = 3, kBluntPasses = 12;
+constexpr double kChangedShare = 0.96;  // of the tolerance, for the triangles they or the refit change
+
+}  // namespace
+
+/// The vertices that stand for a particle alone: copies stay where they are.
+std::vector<char> FrameWork::movable() const {
+    const auto& particle = mesh.carved.particle;
+    const int last = particle.empty() ? -1 : *std::max_element(particle.begin(), particle.end());
+    std::vector<int> vertex(last + 1, -1);
+    std::vector<char> result;
+    for (const int p : particle) {
+        const int v = static_cast<int>(result.size());
+        result.push_back(p >= 0 && vertex[p] < 0);
+        if (p < 0) continue;
+        if (vertex[p] >= 0) result[vertex[p]] = 0;
+        vertex[p] = v;
+    }
+    return result;
+}
+
+/// Fits the mesh once more, with other diagonals.
+void FrameWork::refit() {
+    const StageTimer timer(frame.seconds, "fit");
+    inspection =
+        refit_within(mesh, inspection, movable(), surface, kChangedShare * limits.tolerance, *inspector);
+}
+
+/// Makes sharp triangles blunter. The particles stay where they are: the next frame's triangles are others.
+void FrameWork::blunt() {
+    const StageTimer timer(frame.seconds, "blunt");
+    Blunter blunter(mesh.vertices, mesh.carved.triangles, movable(), surface, *crossings,
+                    kChangedShare * limits.tolerance);
+    const auto missed = [&] {
+        std::vector<std::array<double, 3>> places;
+        for (const auto& c : inspection.missed) places.push_back({c.point.x(), c.point.y(), c.point.z()});
+        std::sort(places.begin(), places.end());
+        return places;
+    };
+    const auto before = missed();
+    // What is missed now but was not before; nothing where not more is missed.
+    const auto newly_missed = [&] {
+        for (const Blunting& change : blunter.changes())
+            if (change.vertex < 0)
+                for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
+        inspection = inspector->inspect_both_ways(mesh);
+        std::vector<Vec3> places;
+        if (inspection.missed.size() <= before.size()) return places;
+        for (const auto& p : missed())
+            if (!std::binary_search(before.begin(), before.end(), p)) places.emplace_back(p[0], p[1], p[2]);
+        return places;
+    };
+    bool again = true;
+    for (int round = 0; again && round < kBluntRounds && blunter.run(kBluntPasses); ++round) {
+        again = false;
+        for (auto places = newly_missed(); !places.empty(); places = newly_missed())
+            again = blunter.undo_near(places, limits.tolerance);
+    }
+}
+
+TrackedFrame FrameWork::finish(const TrackerOptions& options) {
+    if (options.method != Method::Paper) blunt();
+    if (options.method != Method::Paper && options.fit) refit();
+    report(mesh, inspection, limits, frame);
+    frame.mesh.points = std::move(mesh.vertices);
+    frame.mesh.triangles = std::move(mesh.carved.triangles);
+    return std::move(frame);
+}
+
+}  // namespace isotrack

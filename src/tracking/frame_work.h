@@ -1,0 +1,34 @@
+// A frame in the making, and what is left to do of it when its particles are final.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "isotrack/sampling/cover.h"
+#include "isotrack/sampling/sizing.h"
+#include "isotrack/surface/surface.h"
+#include "isotrack/tracking/tracker.h"
+#include "tracking/inspection.h"
+
+namespace isotrack {
+
+struct FrameWork {
+    const Surface& surface;
+    const SizingLimits limits;
+    TrackedFrame frame;
+    FrameMesh mesh;
+    std::optional<CrossingGrid> crossings;
+    std::optional<Inspector> inspector;  ///< Of this mesh.
+    Inspection inspection;
+
+    /// Makes the triangles better as far as the mesh goes on reaching all it reached, and hands the frame
+    /// over. Needs nothing of the tracker, which may be at the next frames.
+    TrackedFrame finish(const TrackerOptions& options);
+
+private:
+    std::vector<char> movable() const;
+    void blunt();
+    void refit();
+};
+
+}  // namespace isotrack

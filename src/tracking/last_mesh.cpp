@@ -1,0 +1,82 @@
+#include "tracking/last_mesh.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "sampling/compact.h"
+
+namespace isotrack {
+namespace {
+
+/// The distance to the nearest Delaunay neighbour that faces the other way.
+std::vector<double> thickness_of(const Particles& particles, const Tetrahedra& cells) {
+    std::vector<double> th(particles.size(), std::numeric_limits<double>::infinity());
+    for (const auto& cell : cells.vertices)
+        for (int a = 0; a < 4; ++a)
+            for (int b = a + 1; b < 4; ++b) {
+                const int i = cell[a], j = cell[b];
+                if (i < 0 || j < 0 || !(particles.normal[i].dot(particles.normal[j]) < 0.0)) continue;
+                const double apart = (particles.position[i] - particles.position[j]).norm();
+                th[i] = std::min(th[i], apart);
+                th[j] = std::min(th[j], apart);
+            }
+    return th;
+}
+
+}  // namespace
+
+std::vector<Triangle> particle_triangles(const CarvedSurface& carved) {
+    std::vector<Triangle> result;
+    result.reserve(carved.triangles.size());
+    for (const Triangle& t : carved.triangles) {
+        const Triangle p = {carved.particle[t[0]], carved.particle[t[1]], carved.particle[t[2]]};
+        if (p[0] >= 0 && p[1] >= 0 && p[2] >= 0) result.push_back(p);
+    }
+    return result;
+}
+
+void LastMesh::take(std::vector<Triangle> of_mesh, std::size_t particles) {
+    triangles = std::move(of_mesh);
+    ring = ring_of(triangles, particles);
+}
+
+void LastMesh::take(const CarvedSurface& carved, const Particles& particles, const Tetrahedra& cells) {
+    take(particle_triangles(carved), particles.size());
+    evidence.error.resize(particles.size(), -1.0);
+    evidence.thickness = thickness_of(particles, cells);
+}
+
+void LastMesh::retain(const std::vector<char>& keep) {
+    compact(evidence.error, keep);
+    compact(evidence.thickness, keep);
+    ring = ring.restricted(keep);
+    const std::vector<int> number = numbers_after(keep);
+    std::size_t kept = 0;
+    for (const Triangle& t : triangles)
+        if (keep[t[0]] && keep[t[1]] && keep[t[2]])
+            triangles[kept++] = {number[t[0]], number[t[1]], number[t[2]]};
+    triangles.resize(kept);
+}
+
+void LastMesh::reorder(const std::vector<int>& order) {
+    isotrack::reorder(evidence.error, order);
+    isotrack::reorder(evidence.thickness, order);
+    std::vector<int> place(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = static_cast<int>(i);
+    for (Triangle& t : triangles)
+        for (int& corner : t) corner = place[corner];
+    ring = ring_of(triangles, order.size());
+}
+
+void LastMesh::grow(std::size_t particles, const std::vector<Triangle>& parents) {
+    for (std::size_t k = 0; k < parents.size(); ++k) {
+        const auto& [a, b, c] = parents[k];
+        const int i = static_cast<int>(ring.size() + k);
+        triangles.insert(triangles.end(), {{a, b, i}, {b, c, i}, {c, a, i}});
+    }
+    ring = ring.extended(parents, particles);
+    evidence.error.resize(particles, -1.0);
+    evidence.thickness.resize(particles, std::numeric_limits<double>::infinity());
+}
+
+}  // namespace isotrack
