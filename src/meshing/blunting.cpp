@@ -62,22 +62,32 @@ double BluntedMesh::facing(const std::vector<Triangle>& some) const {
     double least = 1.0;
     for (const Triangle& t : some) {
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-        least = std::min(least, (b - a).cross(c - a).normalized().dot(probe.normal((a + b + c) / 3.0)));
+        const Vec3 n = (b - a).cross(c - a).normalized();
+        double most = n.dot(probe.normal((a + b + c) / 3.0));
+        for (const int v : t)
+            if (most < kFacing) most = std::max(most, n.dot(probe.normal(points[v])));
+        least = std::min(least, most);
     }
     return least;
 }
 
-Replaced BluntedMesh::replaced(const std::vector<Triangle>& some) const {
-    Replaced result{facing(some), {}, {}};
-    for (const Triangle& t : some) {
+Replaced BluntedMesh::replaced(std::vector<int> numbers) const {
+    Replaced result;
+    std::vector<Triangle> old;
+    for (const int number : numbers) {
+        const Triangle& t = triangles[number];
+        old.push_back(t);
         result.triangles.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
         result.box.extend(box_of(points, t));
     }
+    result.facing = facing(old);
+    std::sort(numbers.begin(), numbers.end());
+    result.number = std::move(numbers);
     return result;
 }
 
 /// Crossings farther from the old triangles than the tolerance are the concern of others.
-bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>& candidates) const {
+bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>& candidates) {
     std::vector<FacingTriangle> after;
     for (const Triangle& t : candidates) after.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
     const double own2 = kOwn * tolerance * kOwn * tolerance, tolerance2 = tolerance * tolerance;
@@ -96,14 +106,19 @@ bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>
         }
         if (!own) return;
         const double limit = std::max(least, tolerance2);
-        all = std::any_of(after.begin(), after.end(), [&](const FacingTriangle& t) {
+        const auto reaches = [&](const FacingTriangle& t) {
             return t.squared_distance(crossing, limit) <= limit;
-        });
+        };
+        all = std::any_of(after.begin(), after.end(), reaches);
+        if (all) return;
+        const Vec3 within = Vec3::Constant(std::sqrt(limit));
+        for (const Triangle& t : near(Box(crossing.point - within, crossing.point + within), before.number))
+            all = all || reaches({points[t[0]], points[t[1]], points[t[2]]});
     });
     return all;
 }
 
-bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replaced& before) const {
+bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replaced& before) {
     if (!(facing(candidates) > std::min(kFacing, before.facing))) return false;
     const auto is_near = [&](const Triangle& t) {
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
@@ -167,6 +182,7 @@ bool Blunter::pass() {
                      surface_.resolution(),
                      *probe,
                      crossings_,
+                     lost_,
                      std::vector<char>(points_.size(), 0),
                      std::nullopt};
     for (const auto& [sharpest, t] : sharp) {

@@ -1,19 +1,24 @@
 // The two ways to make a sharp triangle blunter.
 #pragma once
 
+#include <algorithm>
 #include <optional>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "isotrack/meshing/blunting.h"
 #include "isotrack/meshing/certify.h"
 #include "meshing/corners.h"
+#include "meshing/sharpness.h"
 #include "meshing/triangle_boxes.h"
 
 namespace isotrack {
 
 /// What a change would replace.
 struct Replaced {
-    double facing;  ///< The least cosine between normals of its triangles and the surface's.
+    std::vector<int> number;  ///< Ascending.
+    double facing;            ///< The least cosine between normals of its triangles and the surface's.
     std::vector<FacingTriangle> triangles;
     Box box;
 };
@@ -29,23 +34,31 @@ struct BluntedMesh {
     double resolution;  ///< Of the surface.
     Surface::Probe& probe;
     const CrossingGrid& crossings;
-    std::vector<char> touched;                          ///< Per vertex: a change is near.
+    std::set<std::pair<int, int>>&
+        lost;                   ///< Edges, ascending, that may come back and are not to be made anew.
+    std::vector<char> touched;  ///< Per vertex: a change is near.
     std::optional<TriangleBoxes> boxes = std::nullopt;  ///< Made when they are asked for.
 
     double sharpness_of(const Triangle& t) const;
-    Replaced replaced(const std::vector<Triangle>& some) const;
+    Replaced replaced(std::vector<int> numbers) const;
     /// Whether all these triangles face the way the surface does, or no worse than those they stand for, are
-    /// within the tolerance of it, and keep what those stand for of the crossings within the tolerance.
-    bool may_have(const std::vector<Triangle>& candidates, const Replaced& before) const;
+    /// within the tolerance of it, and with the rest of the mesh keep what those stand for of the crossings
+    /// within the tolerance.
+    bool may_have(const std::vector<Triangle>& candidates, const Replaced& before);
     /// The triangles but `except` (ascending) whose boxes meet this one.
     std::vector<Triangle> near(const Box& box, const std::vector<int>& except);
 
 private:
     double facing(const std::vector<Triangle>& some) const;
-    bool reach_what(const Replaced& before, const std::vector<Triangle>& candidates) const;
+    bool reach_what(const Replaced& before, const std::vector<Triangle>& candidates);
 };
 
-constexpr double kBluntGain = 0.9;  // of the cotangent, at most, for a change to be worth it
+/// The largest cotangent that makes a change of triangles with this one worth it: a tenth less, or as little
+/// as is wanted.
+inline double worth(double before) {
+    constexpr double kGain = 0.9;
+    return std::max(kGain * before, kSharpnessAt30Degrees);
+}
 
 /// The other diagonal for the longest edge of a triangle with this cotangent.
 std::optional<Blunting> flip(BluntedMesh& mesh, int triangle, double sharpness);

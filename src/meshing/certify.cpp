@@ -44,6 +44,10 @@ double squared_distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3&
 }
 
 /// A place in a triangle, by barycentric coordinates, and how far it is from the surface.
+constexpr double kFewestSteps = 3.0, kMostSteps = 6.0;
+constexpr double kAlmost =
+    1.4;  // times what is refined: a few points may have missed the larger of two maxima
+
 struct Sample {
     double u = 0.0, v = 0.0, distance = 0.0;
 };
@@ -91,9 +95,9 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
 }
 
 int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution) {
-    constexpr double kFewest = 3.0, kMost = 6.0;
     const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-    return static_cast<int>(std::clamp(std::ceil(std::sqrt(longest2) / resolution), kFewest, kMost));
+    return static_cast<int>(
+        std::clamp(std::ceil(std::sqrt(longest2) / resolution), kFewestSteps, kMostSteps));
 }
 
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
@@ -106,9 +110,10 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
             const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
                        &c = points[triangles[t][2]];
-            errors[t] = triangle_error(
-                a, b, c, probe, steps == kStepsByLength ? error_steps(a, b, c, surface.resolution()) : steps,
-                refine_above);
+            const int first = steps == kStepsByLength ? error_steps(a, b, c, surface.resolution()) : steps;
+            errors[t] = triangle_error(a, b, c, probe, first, refine_above);
+            if (steps == kStepsByLength && first < kMostSteps && errors[t].largest > kAlmost * refine_above)
+                errors[t] = triangle_error(a, b, c, probe, kMostSteps, refine_above);
         }
     });
     return errors;

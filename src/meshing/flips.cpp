@@ -24,13 +24,14 @@ std::optional<Blunting> flip(BluntedMesh& mesh, int triangle, double sharpness) 
     if (touched[a] || touched[b] || touched[c]) return std::nullopt;
     const auto [d, other] = beyond(c, b);
     if (d < 0 || d == a || touched[d]) return std::nullopt;
-    if (beyond(a, d).second >= 0 || beyond(d, a).second >= 0) return std::nullopt;
+    if (beyond(a, d).second >= 0 || beyond(d, a).second >= 0 || mesh.lost.count(std::minmax(a, d)) > 0)
+        return std::nullopt;
     const Triangle first = {a, b, d}, second = {a, d, c};
     const double before = std::max(sharpness, mesh.sharpness_of(triangles[other]));
-    if (!(std::max(mesh.sharpness_of(first), mesh.sharpness_of(second)) < kBluntGain * before))
-        return std::nullopt;
-    if (!mesh.may_have({first, second}, mesh.replaced({old, triangles[other]}))) return std::nullopt;
+    if (!(std::max(mesh.sharpness_of(first), mesh.sharpness_of(second)) < worth(before))) return std::nullopt;
+    if (!mesh.may_have({first, second}, mesh.replaced({triangle, other}))) return std::nullopt;
     Blunting result{{triangle, other}, {old, triangles[other]}};
+    mesh.lost.insert(std::minmax(b, c));
     triangles[triangle] = first;
     triangles[other] = second;
     for (const int v : {a, b, c, d}) touched[v] = 1;

@@ -8,7 +8,6 @@
 #include "isotrack/meshing/self_intersections.h"
 #include "meshing/blunting.h"
 #include "meshing/corners.h"
-#include "meshing/sharpness.h"
 #include "surface/float_precision.h"
 
 namespace isotrack {
@@ -17,6 +16,8 @@ namespace {
 constexpr int kWays = 8;                              // that are tried from each place
 constexpr double kFirstStep = 0.3, kLastStep = 0.02;  // of the mean edge
 constexpr int kHalvings = 2;                          // of a move that leaves the tolerance
+constexpr double kFitted = 0.01;                      // tolerances: what is that far off may be farther off
+constexpr double kLift = 0.25;                        // tolerances: so far up or down
 
 /// The triangles around a vertex.
 struct Star {
@@ -88,13 +89,13 @@ std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
         if (!mesh.movable[v] || mesh.touched[v]) continue;
         const Star star(v, mesh);
         const std::vector<Triangle> around = triangles_of(star, mesh);
-        const Replaced before = mesh.replaced(around);
+        const Replaced before = mesh.replaced(star.triangle);
         const Vec3 from = points[v], reach = Vec3::Constant(star.mean_edge);
         const std::vector<Triangle> others =
             mesh.near(Box(before.box.min() - reach, before.box.max() + reach), star.triangle);
         Vec3 best = from;
         double least = star.sharpness_at(from);
-        const double enough = kBluntGain * least;
+        const double enough = worth(least);
         for (double step = kFirstStep; step >= kLastStep;) {
             std::vector<std::pair<double, Vec3>> blunter;
             for (int x = -1; x <= 1; ++x)
@@ -146,22 +147,26 @@ std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness)
         if (normal == Vec3::Zero()) continue;
         const Vec3 to = bluntest_place(star, points[v], normal);
         const double before = star.sharpness_at(points[v]), after = star.sharpness_at(to);
-        if (after < kBluntGain * before) moves.push_back({v, std::move(star), to, before, after});
+        if (after < worth(before)) moves.push_back({v, std::move(star), to, before, after});
     }
     std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) { return a.after < b.after; });
     for (const auto& [v, star, goal, before, after] : moves) {
         const Vec3 from = points[v];
         const double height = mesh.probe.value(from);
+        const double lift = std::abs(height) > kFitted * mesh.tolerance ? kLift * mesh.tolerance : 0.0;
         const std::vector<Triangle> around = triangles_of(star, mesh);
-        const Replaced replaced = mesh.replaced(around);
+        const Replaced replaced = mesh.replaced(star.triangle);
         Vec3 way = goal - from;
         for (int halving = 0; halving <= kHalvings; ++halving, way *= 0.5) {
             const auto on_surface = mesh.probe.project(from + way);
             if (!on_surface) continue;
-            const Vec3 to = to_float_precision(*on_surface + height * mesh.probe.normal(*on_surface));
-            if (!(star.sharpness_at(to) < kBluntGain * before)) continue;
-            points[v] = to;
-            if (mesh.may_have(around, replaced)) return moved(mesh, star, around, v, from);
+            const Vec3 n = mesh.probe.normal(*on_surface);
+            for (const double h : {height, height + lift, height - lift}) {
+                const Vec3 to = to_float_precision(*on_surface + h * n);
+                if (!(star.sharpness_at(to) < worth(before))) continue;
+                points[v] = to;
+                if (mesh.may_have(around, replaced)) return moved(mesh, star, around, v, from);
+            }
             points[v] = from;
         }
     }

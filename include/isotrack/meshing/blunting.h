@@ -1,6 +1,8 @@
 // Sharp triangles made blunter, by the other diagonal or by moving a corner along the surface.
 #pragma once
 
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "isotrack/surface/crossing_grid.h"
@@ -26,11 +28,13 @@ public:
 
     /// Looks at the triangles with an angle below 30 degrees, sharpest first, but for those that were looked
     /// at in vain and have not changed since; so often, or until nothing changes. Flips the longest edge, or
-    /// moves a corner that is movable along the surface, its height above it kept, where the smallest angle
-    /// of the triangles concerned grows by a tenth or more, all of them face the way the surface does, or no
-    /// worse than before, are within `tolerance` of it, stay within it of the crossings they stood for, or as
-    /// near as they were, and cross no other triangle. Below 18 degrees corners may leave the surface, too.
-    /// Points that move keep no more digits than floats. Returns whether anything changed.
+    /// moves a corner that is movable along the surface, its height above it kept, or changed where it has
+    /// one and that will not do, where the
+    /// smallest angle of the triangles concerned grows by a tenth or more or to 30 degrees, all of them face
+    /// the way the surface does (at a corner or the centroid), or no worse than before, are within
+    /// `tolerance` of it, leave no crossing that they stood for farther from the mesh than that and than it
+    /// was, and cross no other triangle. Below 18 degrees corners may leave the surface, too. Points that
+    /// move keep no more digits than floats. Returns whether anything changed.
     bool run(int passes);
 
     /// Takes back the changes of which a triangle's box is within `distance` of one of these places, and what
@@ -55,6 +59,7 @@ private:
     std::vector<char> open_;       // per vertex: triangles around it are to be looked at
     std::vector<char> unchecked_;  // per triangle: changed since crossings were looked for
     std::vector<Blunting> changes_;
+    std::set<std::pair<int, int>> lost_;  // edges that were flipped: taking that back brings them back
 };
 
 }  // namespace isotrack
