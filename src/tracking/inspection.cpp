@@ -34,6 +34,28 @@ Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
     return result;
 }
 
+/// The middle between the particles of the longest edge of a triangle that is too sharp across a crease or a
+/// rim: where that edge lies along the crease neither the other diagonal nor moving corners would do.
+std::optional<Shortage> crease_shortage(const FrameMesh& mesh, const Particles& particles,
+                                        std::size_t triangle, const Triangle& corner, double resolution) {
+    constexpr double kLeastHeight = 1.0;  // resolutions: what is thinner has needles anyway
+    constexpr double kSpacing = 0.4;      // of the longest edge
+    const Triangle& t = mesh.carved.triangles[triangle];
+    const auto edge = [&](int k) -> Vec3 {
+        return mesh.vertices[t[(k + 2) % 3]] - mesh.vertices[t[(k + 1) % 3]];
+    };
+    if (!(sharpness(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]) > kSharpnessAt18Degrees) ||
+        angles_matter(particles, corner, resolution))
+        return std::nullopt;
+    int k = 0;
+    for (int i = 1; i < 3; ++i)
+        if (edge(i).squaredNorm() > edge(k).squaredNorm()) k = i;
+    const double longest = edge(k).norm();
+    if (edge(0).cross(edge(1)).norm() < kLeastHeight * resolution * longest) return std::nullopt;
+    const auto& at = particles.position;
+    return Shortage{0.5 * (at[corner[(k + 1) % 3]] + at[corner[(k + 2) % 3]]), kSpacing * longest};
+}
+
 /// After the fit, too.
 bool is_needle_even_fitted(const FrameMesh& mesh, const Particles& particles, std::size_t triangle,
                            const Triangle& corner, double resolution) {
@@ -251,14 +273,18 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
         return (*inspection.errors)[t].largest > kCertified * limits.tolerance;
     };
     std::vector<char> fails(inspection.errors->size());
+    std::vector<std::optional<Shortage>> at_crease(fails.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, fails.size(), 1024), [&](const auto& range) {
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
             const auto [corner, whole] = corners_of(carved, t);
             fails[t] = is_too_far(t) ||
                        (whole && is_needle_even_fitted(mesh, particles, t, corner, surface.resolution()));
+            if (!fails[t] && whole)
+                at_crease[t] = crease_shortage(mesh, particles, t, corner, surface.resolution());
         }
     });
     for (std::size_t t = 0; t < fails.size(); ++t) {
+        if (at_crease[t]) result.push_back(*at_crease[t]);
         if (!fails[t]) continue;
         const bool too_far = is_too_far(t);
         const auto [corner, whole] = corners_of(carved, t);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <set>
 
 #include "isotrack/meshing/certify.h"
@@ -229,6 +230,26 @@ TEST_F(RoughSphere, LosesWhatIsNearAPlaceAndNothingElse) {
     EXPECT_EQ(after.triangles, before.triangles);
     EXPECT_EQ(after.points, before.points);
     EXPECT_FALSE(blunter.undo_near({Vec3(9, 9, 9)}, 1.0));
+}
+
+TEST_F(RoughSphere, StaysAManifoldWhateverIsTakenBack) {
+    std::mt19937 random(7);
+    std::normal_distribution<double> off(0.0, 0.09);
+    for (int attempt = 0; attempt < 20; ++attempt) {
+        after = support::icosphere(3);
+        for (Vec3& p : after.points) p = (p + Vec3(off(random), off(random), off(random))).normalized();
+        if (!self_intersections(after).empty()) continue;
+        Blunter blunter = this->blunter(true);
+        for (int round = 0; round < 6; ++round) {
+            blunter.run(kPasses);
+            for (int place = 0; place < 5; ++place) {
+                const Vec3 at = Vec3(off(random), off(random), off(random)).normalized();
+                blunter.undo_near({at}, 0.05);
+                const MeshTopology topology = mesh_topology(after);
+                ASSERT_TRUE(topology.closed() && topology.manifold() && topology.oriented()) << attempt;
+            }
+        }
+    }
 }
 
 }  // namespace

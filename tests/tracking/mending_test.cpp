@@ -1,0 +1,163 @@
+// What mends a frame's mesh or makes it better, on meshes whose faults are known.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "isotrack/meshing/mesh_topology.h"
+#include "isotrack/meshing/self_intersections.h"
+#include "isotrack/sampling/cover.h"
+#include "isotrack/surface/shapes.h"
+#include "tracking/inspection.h"
+#include "tracking/refitted.h"
+#include "tracking/relabelling.h"
+
+namespace isotrack {
+namespace {
+
+constexpr double kResolution = 0.05, kEdge = 0.2;
+
+/// Seeds on a surface, their DT, and the mesh carved from it.
+struct Carved {
+    const Surface& surface;
+    SizingLimits limits{};
+    Particles particles;
+    Tetrahedra cells;
+    CellLabels labels;
+
+    Carved(const Surface& of, double tolerance) : surface(of) {
+        limits.tolerance = 0.1 * kEdge;  // for the seeds
+        limits.angle = 0.7;
+        limits.min_edge = limits.max_edge = kEdge;
+        Id next_id = 0;
+        cover(particles, surface, CrossingGrid(surface), limits, 1, next_id);
+        limits.tolerance = tolerance;
+        cells = tetrahedralise(particles.position);
+        labels = guided_convection(cells, particles.position, particles.normal, surface);
+    }
+    FrameMesh mesh() const {
+        FrameMesh result;
+        result.carved = carve(cells, labels, particles.position);
+        EXPECT_TRUE(result.carved.midpoints.empty());
+        for (const int p : result.carved.particle) result.vertices.push_back(particles.position[p]);
+        result.on_surface = result.vertices;
+        return result;
+    }
+    Inspection inspect(const FrameMesh& mesh) const {
+        Inspection result;
+        result.errors = std::make_shared<const std::vector<TriangleError>>(
+            triangle_errors(mesh.vertices, mesh.carved.triangles, surface, 6));
+        return result;
+    }
+    Vec3 centroid(int cell) const {
+        Vec3 sum = Vec3::Zero();
+        for (const int v : cells.vertices[cell]) sum += particles.position[v];
+        return sum / 4.0;
+    }
+    std::size_t relabel() {
+        const FrameMesh now = mesh();
+        return isotrack::relabel(labels, cells, now, inspect(now), particles, surface, limits);
+    }
+};
+
+TEST(Relabelling, GivesACellOnTheWrongSideBack) {
+    const auto solid = shapes::ellipsoid({0, 0, 0}, {1.0, 0.8, 0.6}, kResolution);
+    const auto probe = solid->probe();
+    Carved carved(*solid, 0.1);
+    const CellLabels right = carved.labels;
+    ASSERT_EQ(carved.relabel(), 0u);
+    int dents = 0;
+    for (int c = 0; c < static_cast<int>(right.size()); ++c) {
+        // With one facet on the boundary its absence is a dent, whose floor is far inside.
+        int outside = 0;
+        for (int k = 0; k < 4 && right[c]; ++k) outside += !right[carved.cells.neighbour(c, k)];
+        if (outside != 1 || probe->value(carved.centroid(c)) > -0.2) continue;
+        carved.labels = right;
+        carved.labels[c] = 0;
+        EXPECT_GT(carved.relabel(), 0u);
+        EXPECT_EQ(carved.labels, right) << "cell " << c;
+        ++dents;
+    }
+    EXPECT_GT(dents, 3);
+}
+
+TEST(Relabelling, LeavesCellsThatAreClearlyOnTheirSide) {
+    const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.4, kResolution);
+    const auto probe = torus->probe();
+    Carved carved(*torus, 1e-5);  // which no triangle keeps
+    const CellLabels before = carved.labels;
+    EXPECT_GT(carved.relabel(), 0u);  // slivers on the surface, which lie on the side that they do not say
+    for (int c = 0; c < static_cast<int>(before.size()); ++c) {
+        if (carved.labels[c] == before[c]) continue;
+        const double value = probe->value(carved.centroid(c));
+        EXPECT_LE(before[c] ? -value : value, 0.2 * carved.limits.tolerance);
+    }
+}
+
+double sharpest_cotangent(const std::vector<Vec3>& points, const Triangle& t) {
+    double result = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        const Vec3 u = points[t[(k + 1) % 3]] - points[t[k]], w = points[t[(k + 2) % 3]] - points[t[k]];
+        result = std::max(result, u.dot(w) / u.cross(w).norm());
+    }
+    return result;
+}
+
+std::set<std::vector<double>> places(const std::vector<Surface::Crossing>& crossings) {
+    std::set<std::vector<double>> result;
+    for (const auto& c : crossings) result.insert({c.point.x(), c.point.y(), c.point.z()});
+    return result;
+}
+
+/// A box, whose edges no seed is on: flips and moves do much there.
+struct RefitOfABox : ::testing::TestWithParam<double> {
+    const shapes::SurfacePtr box = shapes::box({0, 0, 0}, {1.0, 0.7, 0.45}, kResolution);
+};
+
+TEST_P(RefitOfABox, TakesBackWhatItMustNot) {
+    Carved carved(*box, GetParam());
+    FrameMesh mesh = carved.mesh();
+    const FrameMesh before = mesh;
+    ASSERT_TRUE(self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}).empty());
+    const CrossingGrid crossings(*box);
+    Inspector inspector(*box, carved.limits, crossings);
+    const Inspection first = inspector.inspect_both_ways(mesh);
+    const Inspection last = refit_within(mesh, first, std::vector<char>(mesh.vertices.size(), 1), *box,
+                                         carved.limits.tolerance, inspector);
+    EXPECT_NE(mesh.vertices, before.vertices);
+
+    const TriangleMesh after{mesh.vertices, mesh.carved.triangles, {}, {}};
+    const MeshTopology topology = mesh_topology(after);
+    EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
+    EXPECT_EQ(topology.euler, 2);
+    EXPECT_TRUE(self_intersections(after).empty());
+    double largest_before = 0.0, sum_before = 0.0, sum = 0.0;
+    const auto area = [](const std::vector<Vec3>& p, const Triangle& t) {
+        return (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).norm();
+    };
+    for (std::size_t t = 0; t < first.errors->size(); ++t) {
+        largest_before = std::max(largest_before, (*first.errors)[t].largest);
+        sum_before += (*first.errors)[t].mean_square * area(before.vertices, before.carved.triangles[t]);
+    }
+    double sharpest_before = 0.0;
+    for (const Triangle& t : before.carved.triangles)
+        sharpest_before = std::max(sharpest_before, sharpest_cotangent(before.vertices, t));
+    const auto errors = triangle_errors(after.points, after.triangles, *box, 6);
+    for (std::size_t t = 0; t < errors.size(); ++t) {
+        EXPECT_LE(errors[t].largest, 1.02 * std::max(GetParam(), largest_before));
+        EXPECT_LE(sharpest_cotangent(after.points, after.triangles[t]),
+                  std::max(std::sqrt(3.0), sharpest_before) + 1e-9);
+        sum += errors[t].mean_square * area(after.points, after.triangles[t]);
+    }
+    EXPECT_LT(sum, 0.8 * sum_before);
+    const auto missed_before = places(first.missed);
+    for (const auto& place : places(last.missed)) EXPECT_EQ(missed_before.count(place), 1u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Tolerances, RefitOfABox, ::testing::Values(0.02, 0.05, 0.2));
+
+}  // namespace
+}  // namespace isotrack
