@@ -1,6 +1,7 @@
 #include "isotrack/surface/level_set.h"
 
 #include <openvdb/tools/SignedFloodFill.h>
+#include <openvdb/tools/VolumeToMesh.h>
 #include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
@@ -555,6 +556,13 @@ std::vector<Eigen::Vector3i> LevelSet::upright_crossings() const {
         };
     });
 }
+std::optional<long> LevelSet::lattice_euler() const {
+    std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec4I> quads;
+    openvdb::tools::volumeToMesh(*impl_->grid, points, quads);
+    return static_cast<long>(points.size()) - static_cast<long>(quads.size());  // two edges for every quad
+}
+
 std::vector<Surface::Diagonal> LevelSet::diagonals() const {
     return gather<Diagonal>(impl_->crossed.edges, [this] {
         return [this, nodes = NodeValues(impl_->grid->constTree())](const CrossedEdge& edge,

@@ -26,6 +26,7 @@
 #include "tracking/carry.h"
 #include "tracking/fitted.h"
 #include "tracking/frame_work.h"
+#include "tracking/handles.h"
 #include "tracking/inspection.h"
 #include "tracking/last_mesh.h"
 #include "tracking/refinement.h"
@@ -169,7 +170,6 @@ struct Tracker::Impl {
     /// The mesh of the DT as it is, before any fit.
     FrameMesh carve_mesh(const Surface& surface, std::map<std::string, double>& seconds) {
         const StageTimer timer(seconds, "convect");
-        FrameMesh mesh;
         std::vector<int> changed = dt->take_changed();
         const Tetrahedra& cells = dt->cells();
         if (labels.empty()) {
@@ -180,10 +180,15 @@ struct Tracker::Impl {
             labels = pure_convection(cells, particles.position);
         else
             update_labels(labels, changed, cells, particles.position, particles.normal, surface);
-        mesh.carved = carve(cells, labels, particles.position);
+        return mesh_of(labels, surface);
+    }
+    FrameMesh mesh_of(CellLabels& of_cells, const Surface& surface) const {
+        const Tetrahedra& cells = dt->cells();
+        FrameMesh mesh;
+        mesh.carved = carve(cells, of_cells, particles.position);
         if (options.reconstruction == Reconstruction::Guided &&
-            untangle(labels, cells, particles.position, surface, mesh.carved))
-            mesh.carved = carve(cells, labels, particles.position);
+            untangle(of_cells, cells, particles.position, surface, mesh.carved))
+            mesh.carved = carve(cells, of_cells, particles.position);
         mesh.vertices.reserve(mesh.carved.particle.size());
         std::size_t midpoint = 0;
         for (const int p : mesh.carved.particle)
@@ -413,6 +418,17 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     last_mesh.take(mesh.carved, particles, dt->cells());
     {
         const StageTimer timer(seconds, "certify");
+        const auto carve_labels = [&](CellLabels& of_cells) { return mesh_of(of_cells, surface); };
+        const auto fit_other = [&](FrameMesh& other) {
+            if (!options.fit) return;
+            Fitted its_own = fitted;
+            its_own.fit_vertices(other, particles.size(), surface);
+            its_own.undo_crossing(other, particles.size());
+        };
+        if (options.method == Method::Tolerance && options.reconstruction == Reconstruction::Guided &&
+            mend_handles(labels, dt->cells(), mesh, inspection, *inspector, particles,
+                         last_mesh.evidence.thickness, surface, l, carve_labels, fit_other) > 0)
+            last_mesh.take(mesh.carved, particles, dt->cells());
         remove_specks(mesh, inspection, *inspector, l);
     }
     inherit_velocities(particle_triangles(mesh.carved), first_new);

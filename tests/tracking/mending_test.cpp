@@ -1,5 +1,6 @@
 // What mends a frame's mesh or makes it better, on meshes whose faults are known.
 #include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +11,9 @@
 #include "isotrack/meshing/mesh_topology.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "isotrack/sampling/cover.h"
+#include "isotrack/surface/level_set.h"
 #include "isotrack/surface/shapes.h"
+#include "tracking/handles.h"
 #include "tracking/inspection.h"
 #include "tracking/refitted.h"
 #include "tracking/relabelling.h"
@@ -28,10 +31,10 @@ struct Carved {
     Tetrahedra cells;
     CellLabels labels;
 
-    Carved(const Surface& of, double tolerance) : surface(of) {
-        limits.tolerance = 0.1 * kEdge;  // for the seeds
+    Carved(const Surface& of, double tolerance, double edge = kEdge) : surface(of) {
+        limits.tolerance = 0.1 * edge;  // for the seeds
         limits.angle = 0.7;
-        limits.min_edge = limits.max_edge = kEdge;
+        limits.min_edge = limits.max_edge = edge;
         Id next_id = 0;
         cover(particles, surface, CrossingGrid(surface), limits, 1, next_id);
         limits.tolerance = tolerance;
@@ -41,8 +44,9 @@ struct Carved {
     FrameMesh mesh() const {
         FrameMesh result;
         result.carved = carve(cells, labels, particles.position);
-        EXPECT_TRUE(result.carved.midpoints.empty());
-        for (const int p : result.carved.particle) result.vertices.push_back(particles.position[p]);
+        std::size_t midpoint = 0;
+        for (const int p : result.carved.particle)
+            result.vertices.push_back(p >= 0 ? particles.position[p] : result.carved.midpoints[midpoint++]);
         result.on_surface = result.vertices;
         return result;
     }
@@ -158,6 +162,57 @@ TEST_P(RefitOfABox, TakesBackWhatItMustNot) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Tolerances, RefitOfABox, ::testing::Values(0.02, 0.05, 0.2));
+
+/// A disk of one layer of lattice nodes, which are inside by little: about a third of a voxel thick. Beside
+/// it a ball, so that the values inside are known for distances.
+openvdb::FloatGrid::Ptr thin_disk_and_ball() {
+    auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    auto values = grid->getAccessor();
+    for (int x = -13; x <= 26; ++x)
+        for (int y = -13; y <= 13; ++y)
+            for (int z = -9; z <= 9; ++z) {
+                const double disk = std::max(std::abs(z) - 0.15, std::hypot(x + 0.1, y - 0.2) - 8.3);
+                const double ball = (Vec3(x, y, z) - Vec3(18.2, 0.1, 0.3)).norm() - 5.3;
+                values.setValue({x, y, z}, static_cast<float>(std::clamp(std::min(disk, ball), -3.0, 3.0)));
+            }
+    return grid;
+}
+
+TEST(Handles, FillsAHoleInAThinSheet) {
+    const LevelSet disk(thin_disk_and_ball());
+    ASSERT_EQ(disk.lattice_euler(), 4);
+    Carved carved(disk, 0.5, 0.8);
+    const auto euler = [](const FrameMesh& mesh) {
+        return mesh_topology({mesh.vertices, mesh.carved.triangles, {}, {}}).euler;
+    };
+    ASSERT_EQ(euler(carved.mesh()), 4);
+    const CellLabels right = carved.labels;
+    for (int c = 0; c < static_cast<int>(right.size()); ++c)
+        if (right[c] && (carved.centroid(c) - Vec3(0.5, 0.5, 0.0)).norm() < 0.6) carved.labels[c] = 0;
+    FrameMesh mesh = carved.mesh();
+    ASSERT_EQ(euler(mesh), 2);
+
+    const CrossingGrid crossings(disk);
+    Inspector inspector(disk, carved.limits, crossings);
+    Inspection inspection = inspector.inspect_both_ways(mesh);
+    inspector.inspect_topology(mesh, inspection);
+    const auto carve_labels = [&](CellLabels& labels) {
+        carved.labels = labels;
+        return carved.mesh();
+    };
+    const std::vector<double> thickness(carved.particles.size(), 0.3);
+    CellLabels labels = carved.labels;
+    EXPECT_EQ(mend_handles(labels, carved.cells, mesh, inspection, inspector, carved.particles, thickness,
+                           disk, carved.limits, carve_labels, [](FrameMesh&) {}),
+              1u);
+    EXPECT_EQ(euler(mesh), 4);
+    EXPECT_EQ(euler(carve_labels(labels)), 4);
+    // Now there is nothing to mend.
+    EXPECT_EQ(mend_handles(labels, carved.cells, mesh, inspection, inspector, carved.particles, thickness,
+                           disk, carved.limits, carve_labels, [](FrameMesh&) {}),
+              0u);
+}
 
 }  // namespace
 }  // namespace isotrack

@@ -49,6 +49,7 @@ public:
     std::vector<Crossing> crossings(double apart) const override;
     std::vector<Eigen::Vector3i> upright_crossings() const override;
     std::vector<Diagonal> diagonals() const override;
+    std::optional<long> lattice_euler() const override;  ///< That of volumeToMesh.
 
     /// True when there is no surface: no sign change between neighbouring voxels.
     bool empty() const;

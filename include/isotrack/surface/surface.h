@@ -80,8 +80,8 @@ public:
     /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
     /// in the same order.
     std::vector<Crossing> crossings() const { return crossings(0.0); }
-    /// Of those within a cube of an edge up to `apart` some along one axis may stand for all: one that goes out
-    /// and one that goes in, where there are both. This default scans `bounds()` and gives all.
+    /// Of those within a cube of an edge up to `apart` some along one axis may stand for all: one that goes
+    /// out and one that goes in, where there are both. This default scans `bounds()` and gives all.
     virtual std::vector<Crossing> crossings(double apart) const;
     /// The lower ends of the crossed edges along the lattice's third axis, in any order.
     virtual std::vector<Eigen::Vector3i> upright_crossings() const;
@@ -95,6 +95,9 @@ public:
 
     /// Those of a surface that says how nodes are joined; this default has none.
     virtual std::vector<Diagonal> diagonals() const { return {}; }
+    /// The Euler number of the surface that parts the lattice nodes, one vertex or more per cell, joined as
+    /// `diagonals` says; this default does not know it. Takes as long as meshing every cell.
+    virtual std::optional<long> lattice_euler() const { return std::nullopt; }
 };
 
 }  // namespace isotrack
