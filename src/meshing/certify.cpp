@@ -43,11 +43,11 @@ double squared_distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3&
     return (ap - (vb / sum) * ab - (vc / sum) * ac).squaredNorm();
 }
 
-/// A place in a triangle, by barycentric coordinates, and how far it is from the surface.
-constexpr double kFewestSteps = 3.0, kMostSteps = 6.0;
+constexpr int kFewestSteps = 3, kMostSteps = 6;
 constexpr double kAlmost =
     1.4;  // times what is refined: a few points may have missed the larger of two maxima
 
+/// A place in a triangle, by barycentric coordinates, and how far it is from the surface.
 struct Sample {
     double u = 0.0, v = 0.0, distance = 0.0;
 };
@@ -96,8 +96,8 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
 
 int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution) {
     const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-    return static_cast<int>(
-        std::clamp(std::ceil(std::sqrt(longest2) / resolution), kFewestSteps, kMostSteps));
+    const double wanted = std::ceil(std::sqrt(longest2) / resolution);
+    return static_cast<int>(std::clamp<double>(wanted, kFewestSteps, kMostSteps));
 }
 
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
@@ -112,8 +112,11 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                        &c = points[triangles[t][2]];
             const int first = steps == kStepsByLength ? error_steps(a, b, c, surface.resolution()) : steps;
             errors[t] = triangle_error(a, b, c, probe, first, refine_above);
-            if (steps == kStepsByLength && first < kMostSteps && errors[t].largest > kAlmost * refine_above)
-                errors[t] = triangle_error(a, b, c, probe, kMostSteps, refine_above);
+            if (steps != kStepsByLength || first == kMostSteps ||
+                !(errors[t].largest > kAlmost * refine_above))
+                continue;
+            const TriangleError again = triangle_error(a, b, c, probe, kMostSteps, refine_above);
+            if (again.largest > errors[t].largest) errors[t] = again;
         }
     });
     return errors;

@@ -8,6 +8,7 @@
 #include "isotrack/meshing/self_intersections.h"
 #include "meshing/blunting.h"
 #include "meshing/corners.h"
+#include "meshing/sharpness.h"
 #include "surface/float_precision.h"
 
 namespace isotrack {
@@ -165,9 +166,13 @@ std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness)
                 const Vec3 to = to_float_precision(*on_surface + h * n);
                 if (!(star.sharpness_at(to) < worth(before))) continue;
                 points[v] = to;
+                const bool had_boxes = mesh.boxes.has_value();
                 if (mesh.may_have(around, replaced)) return moved(mesh, star, around, v, from);
+                points[v] = from;
+                if (!had_boxes && mesh.boxes)  // made with v where it may not be
+                    for (const int t : star.triangle) mesh.boxes->note(t);
+                if (lift == 0.0) break;
             }
-            points[v] = from;
         }
     }
     return sharpness > kSharpnessAt18Degrees ? search(mesh, triangle) : std::nullopt;

@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "isotrack/sampling/cover.h"
 #include "isotrack/sampling/sizing.h"
+#include "isotrack/surface/crossing_grid.h"
 #include "isotrack/surface/surface.h"
 #include "isotrack/tracking/tracker.h"
 #include "tracking/inspection.h"

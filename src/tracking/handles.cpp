@@ -84,24 +84,28 @@ std::size_t mend_handles(CellLabels& labels, const Tetrahedra& cells, FrameMesh&
                          const SizingLimits& limits,
                          const std::function<FrameMesh(CellLabels&)>& carve_labels,
                          const std::function<void(FrameMesh&)>& fit) {
-    if (std::none_of(thickness.begin(), thickness.end(),
-                     [&](double apart) { return apart < kThin * surface.resolution(); }))
-        return 0;
+    const std::vector<Vec3> places = suspicious_places(mesh, thickness, surface.resolution());
+    if (places.empty()) return 0;
     std::optional<long> wanted = surface.lattice_euler();
     if (!wanted) return 0;
     *wanted += topology_of(mesh, inspection.topology.speck).euler;  // which will be left out
     MeshTopology now = topology_of(mesh, std::vector<char>(mesh.carved.triangles.size(), 1));
     if (now.euler >= *wanted) return 0;
-    const std::vector<Vec3> places = suspicious_places(mesh, thickness, surface.resolution());
     const auto mend_at = [&](const Vec3& place) {
         if (now.euler >= *wanted) return false;
         const auto between = cells_between(place, cells, particles, surface);
+        std::size_t tried[2] = {0, 0};  // how many cells, from outside and from inside
         for (const double unclear : kUnclear)
             for (const char from : {0, 1}) {
                 CellLabels changed = labels;
-                for (const auto& [distance, c] : between)
-                    if (distance <= unclear * surface.resolution() && labels[c] == from) changed[c] = !from;
-                if (changed == labels) continue;
+                std::size_t count = 0;
+                for (const auto& [distance, c] : between) {
+                    if (distance > unclear * surface.resolution() || labels[c] != from) continue;
+                    changed[c] = !from;
+                    ++count;
+                }
+                if (count == tried[static_cast<int>(from)]) continue;
+                tried[static_cast<int>(from)] = count;
                 FrameMesh other = carve_labels(changed);
                 const MeshTopology then =
                     topology_of(other, std::vector<char>(other.carved.triangles.size(), 1));

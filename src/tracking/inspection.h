@@ -83,8 +83,9 @@ private:
 };
 
 /// Where particles are missing: at the dual crossings of triangles with too large an error or, where the
-/// surface is smooth, too small an angle; at crossings that are missed; around nodes whose side is wrong; on
-/// complex edges.
+/// surface is smooth, too small an angle; in the middle of the longest edge of what is sharper than 18
+/// degrees across a crease, if a resolution high or more; at crossings that are missed; around nodes whose
+/// side is wrong; on complex edges.
 std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspection, const Tetrahedra& cells,
                                 const Particles& particles, const Surface& surface,
                                 const SizingLimits& limits);

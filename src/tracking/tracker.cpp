@@ -182,6 +182,8 @@ struct Tracker::Impl {
             update_labels(labels, changed, cells, particles.position, particles.normal, surface);
         return mesh_of(labels, surface);
     }
+
+    /// Carves labels, which change where they are untangled.
     FrameMesh mesh_of(CellLabels& of_cells, const Surface& surface) const {
         const Tetrahedra& cells = dt->cells();
         FrameMesh mesh;
@@ -374,8 +376,8 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
             break;
         make_room(surface, frame);
     }
-    last_mesh.take({},
-                   particles.size());  // the last mesh is of no more use, and the most memory is needed now
+    // The last mesh is of no more use, and the most memory is needed now.
+    last_mesh.take({}, particles.size());
     // A fitted mesh fails elsewhere than its particles do; of a DT built anew all cells are new.
     const bool refines = !options.fit && options.method == Method::Tolerance &&
                          options.reconstruction == Reconstruction::Guided &&

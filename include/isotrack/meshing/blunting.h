@@ -28,10 +28,10 @@ public:
 
     /// Looks at the triangles with an angle below 30 degrees, sharpest first, but for those that were looked
     /// at in vain and have not changed since; so often, or until nothing changes. Flips the longest edge, or
-    /// moves a corner that is movable along the surface, its height above it kept, or changed where it has
-    /// one and that will not do, where the
-    /// smallest angle of the triangles concerned grows by a tenth or more or to 30 degrees, all of them face
-    /// the way the surface does (at a corner or the centroid), or no worse than before, are within
+    /// moves a corner that is movable along the surface. Its height above it is kept; one of a hundredth of
+    /// `tolerance` or more may become a quarter of that higher or lower where it must. A change is made where
+    /// the smallest angle of the triangles concerned grows by a tenth or more or to 30 degrees, and all of
+    /// them face the way the surface does (at a corner or the centroid), or no worse than before, are within
     /// `tolerance` of it, leave no crossing that they stood for farther from the mesh than that and than it
     /// was, and cross no other triangle. Below 18 degrees corners may leave the surface, too. Points that
     /// move keep no more digits than floats. Returns whether anything changed.

@@ -24,8 +24,8 @@ using CellLabels = std::vector<char>;
 ///   is coherent among the slivers that lie on the sheet;
 /// - any other cell spans two sheets, a thin solid or a gap, where the circumcentre may lie beyond the far
 ///   sheet: it is inside when its centroid is. So is a cell where the gradient is short, since sheets less
-///   than a voxel apart blur each other's normals, and one with its centroid a voxel or more from the surface,
-///   which no sliver on a sheet has.
+///   than a voxel apart blur each other's normals, and one with its centroid a voxel or more from the
+///   surface, which no sliver on a sheet has.
 /// A cell too flat to have a circumcentre takes the label of the cell it flows to.
 CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& points,
                              const std::vector<Vec3>& normals, const Surface& surface);
