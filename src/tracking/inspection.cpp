@@ -39,7 +39,7 @@ Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
 std::optional<Shortage> crease_shortage(const FrameMesh& mesh, const Particles& particles,
                                         std::size_t triangle, const Triangle& corner, double resolution) {
     constexpr double kLeastHeight = 1.0;  // resolutions: what is thinner has needles anyway
-    constexpr double kSpacing = 0.4;      // of the longest edge
+    constexpr double kSpacing = 0.2;      // of the longest edge
     const Triangle& t = mesh.carved.triangles[triangle];
     const auto edge = [&](int k) -> Vec3 {
         return mesh.vertices[t[(k + 2) % 3]] - mesh.vertices[t[(k + 1) % 3]];
