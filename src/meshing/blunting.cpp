@@ -82,6 +82,18 @@ Replaced BluntedMesh::replaced(std::vector<int> numbers) const {
     }
     result.facing = facing(old);
     std::sort(numbers.begin(), numbers.end());
+    std::vector<int> beside;
+    for (const Triangle& t : old)
+        for (const int v : t)
+            for (int e = corners.first[v]; e < corners.first[v + 1]; ++e)
+                beside.push_back(corners.corner[e] / 3);
+    std::sort(beside.begin(), beside.end());
+    beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
+    for (const int number : beside) {
+        if (std::binary_search(numbers.begin(), numbers.end(), number)) continue;
+        const Triangle& t = triangles[number];
+        result.beside.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
+    }
     result.number = std::move(numbers);
     return result;
 }
@@ -109,11 +121,8 @@ bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>
         const auto reaches = [&](const FacingTriangle& t) {
             return t.squared_distance(crossing, limit) <= limit;
         };
-        all = std::any_of(after.begin(), after.end(), reaches);
-        if (all) return;
-        const Vec3 within = Vec3::Constant(std::sqrt(limit));
-        for (const Triangle& t : near(Box(crossing.point - within, crossing.point + within), before.number))
-            all = all || reaches({points[t[0]], points[t[1]], points[t[2]]});
+        all = std::any_of(after.begin(), after.end(), reaches) ||
+              std::any_of(before.beside.begin(), before.beside.end(), reaches);
     });
     return all;
 }

@@ -20,6 +20,7 @@ struct Replaced {
     std::vector<int> number;  ///< Ascending.
     double facing;            ///< The least cosine between normals of its triangles and the surface's.
     std::vector<FacingTriangle> triangles;
+    std::vector<FacingTriangle> beside;  ///< With a vertex in common.
     Box box;
 };
 
@@ -42,7 +43,7 @@ struct BluntedMesh {
     double sharpness_of(const Triangle& t) const;
     Replaced replaced(std::vector<int> numbers) const;
     /// Whether all these triangles face the way the surface does, or no worse than those they stand for, are
-    /// within the tolerance of it, and with the rest of the mesh keep what those stand for of the crossings
+    /// within the tolerance of it, and with those beside them keep what those stand for of the crossings
     /// within the tolerance.
     bool may_have(const std::vector<Triangle>& candidates, const Replaced& before);
     /// The triangles but `except` (ascending) whose boxes meet this one.

@@ -166,11 +166,8 @@ std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness)
                 const Vec3 to = to_float_precision(*on_surface + h * n);
                 if (!(star.sharpness_at(to) < worth(before))) continue;
                 points[v] = to;
-                const bool had_boxes = mesh.boxes.has_value();
                 if (mesh.may_have(around, replaced)) return moved(mesh, star, around, v, from);
                 points[v] = from;
-                if (!had_boxes && mesh.boxes)  // made with v where it may not be
-                    for (const int t : star.triangle) mesh.boxes->note(t);
                 if (lift == 0.0) break;
             }
         }
