@@ -8,6 +8,7 @@ namespace {
 
 constexpr int kTrials = 5;  // of lambda within one step
 constexpr int kMostNeighbours = 64;
+constexpr double kLeastInPlane = 0.5;  // of a way to go: more upright than that there is none
 
 struct Neighbour {
     Vec3 position;
@@ -66,7 +67,7 @@ void tangent_frame(const Vec3& n, Vec3& a, Vec3& b) {
 }  // namespace
 
 DescentStep descend(Particles& particles, const std::vector<Metric>& metrics, Adjacency::Range neighbours,
-                    int i, double& lambda, Surface::Probe& probe) {
+                    int i, double& lambda, Surface::Probe& probe, const Vec3* along) {
     const Surroundings near(particles, metrics, neighbours, i);
     if (near.count == 0 || !(near.sigma2 > 0.0)) return {};
     const double sigma = std::sqrt(near.sigma2);
@@ -74,6 +75,12 @@ DescentStep descend(Particles& particles, const std::vector<Metric>& metrics, Ad
     const Vec3 n = particles.normal[i];
     Vec3 a, b;
     tangent_frame(n, a, b);
+    if (along) {
+        const Vec3 in_plane = *along - along->dot(n) * n;
+        if (!(in_plane.norm() > kLeastInPlane)) return {0.0, sigma};
+        a = in_plane.normalized();
+        b = n.cross(a);
+    }
 
     // Gradient and Hessian of the tangential energy F_i (appendix 1, with the sign of the gradient put right:
     // it points away from where the energy falls, towards the neighbours).
@@ -90,6 +97,10 @@ DescentStep descend(Particles& particles, const std::vector<Metric>& metrics, Ad
             h12 += c * s1 * s2;
             h22 += c * s2 * s2;
         }
+    }
+    if (along) {
+        g2 = h12 = 0.0;
+        h22 = 1.0;
     }
     const double energy = near.energy(p);
     for (int trial = 0; trial < kTrials; ++trial) {

@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "sampling/creases.h"
 #include "sampling/descent.h"
 #include "surface/thread_probes.h"
 
@@ -14,7 +15,17 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
     for (std::size_t i = 0; i < particles.size(); ++i) metrics.push_back(metric_of(particles, i));
     std::vector<double> lambda(particles.size(), 0.1);
     std::vector<char> moved(particles.size(), 1), active(particles.size(), 1);
+    std::vector<Crease> crease(particles.size());
     int done = 0;
+    const auto step = [&](int i, Surface::Probe& probe) {
+        // Who is on a crease in the first sweep stays on it.
+        if (done == 0 || crease[i].kind != Crease::Kind::None)
+            crease[i] = pull_to_crease(particles, adjacency.of(i), i, surface.resolution(), probe);
+        if (crease[i].kind == Crease::Kind::Corner) return false;
+        const Vec3* along = crease[i].kind == Crease::Kind::Line ? &crease[i].along : nullptr;
+        return descend(particles, metrics, adjacency.of(i), i, lambda[i], probe, along).moved >
+               kRestThreshold;
+    };
     for (; done < sweeps; ++done) {
         if (done > 0) {
             bool any = false;
@@ -30,9 +41,7 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
                 Surface::Probe& probe = probes.local();
                 for (std::size_t g = range.begin(); g < range.end(); ++g) {
                     const int i = group[g];
-                    moved[i] =
-                        active[i] && descend(particles, metrics, adjacency.of(i), i, lambda[i], probe).moved >
-                                         kRestThreshold;
+                    moved[i] = active[i] && step(i, probe);
                 }
             });
     }

@@ -1,0 +1,78 @@
+#include "sampling/creases.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace isotrack {
+namespace {
+
+constexpr double kTurn = 0.94;        // cosine between neighbours' normals: less may be a crease
+constexpr double kNeighbourly = 2.0;  // spacings
+constexpr double kReach = 0.4;        // of the spacing
+constexpr double kRoom = 0.8;         // of the spacing: nobody that near to where it goes
+constexpr double kStill = 0.02;       // of the spacing: one that moves less is there already
+constexpr int kWays = 8;
+constexpr double kLine = 0.03;   // second eigenvalue: a crease of 20 degrees through the middle
+constexpr double kCorner = 0.2;  // third: a small ball is none, the corner of a cube is
+
+bool may_be_near_crease(const Particles& particles, Adjacency::Range neighbours, int i) {
+    const double near = kNeighbourly * particles.spacing[i];
+    return std::any_of(neighbours.begin(), neighbours.end(), [&](int j) {
+        return particles.normal[i].dot(particles.normal[j]) < kTurn &&
+               (particles.position[j] - particles.position[i]).squaredNorm() < near * near;
+    });
+}
+
+bool is_taken(const Particles& particles, Adjacency::Range neighbours, const Vec3& place, const Vec3& normal,
+              double distance) {
+    return std::any_of(neighbours.begin(), neighbours.end(), [&](int j) {
+        return particles.normal[j].dot(normal) > 0.0 &&
+               (particles.position[j] - place).squaredNorm() < distance * distance;
+    });
+}
+
+}  // namespace
+
+Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, double resolution,
+                      Surface::Probe& probe) {
+    if (!may_be_near_crease(particles, neighbours, i)) return {};
+    const Vec3 p = particles.position[i], n = particles.normal[i];
+    const double reach = kReach * particles.spacing[i], around = std::max(reach, resolution);
+    const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
+    Mat3 normals = n * n.transpose();
+    Vec3 pull = Vec3::Zero();
+    for (int way = 0; way < kWays; ++way) {
+        const double angle = way * (2.0 * M_PI / kWays);
+        const Vec3 to = around * (std::cos(angle) * a + std::sin(angle) * b);
+        const Surface::Sample f = probe.sample(p + to);
+        const double slope = f.gradient.norm();
+        if (!(slope > 0.0)) return {};
+        const Vec3 m = f.gradient / slope;
+        normals += m * m.transpose();
+        pull += (m.dot(to) - f.value / slope) * m;
+    }
+    const int planes = kWays + 1;
+    const Eigen::SelfAdjointEigenSolver<Mat3> spread(normals / planes);
+    const Vec3& values = spread.eigenvalues();  // ascending
+    if (!(values[1] > kLine)) return {};
+    const bool is_corner = values[0] > kCorner;
+    Vec3 move = Vec3::Zero();
+    for (int k = is_corner ? 0 : 1; k < 3; ++k) {
+        const Vec3 axis = spread.eigenvectors().col(k);
+        move += axis.dot(pull) / (planes * values[k]) * axis;
+    }
+    const auto is_within = [&](const Vec3& x) { return x.squaredNorm() < reach * reach; };
+    if (!is_within(move)) return {};
+    const auto q = probe.project(p + move);
+    if (!q || !is_within(*q - p)) return {};
+    const Vec3 normal = probe.normal(*q);
+    if (!(normal.dot(n) > 0.0)) return {};
+    const bool stays = (*q - p).norm() < kStill * particles.spacing[i];
+    if (!stays && is_taken(particles, neighbours, *q, normal, kRoom * particles.spacing[i])) return {};
+    particles.position[i] = *q;
+    particles.normal[i] = normal;
+    return {is_corner ? Crease::Kind::Corner : Crease::Kind::Line, spread.eigenvectors().col(0)};
+}
+
+}  // namespace isotrack

@@ -1,0 +1,105 @@
+// Who is pulled on to a crease, and how particles lie along one.
+#include "sampling/creases.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "isotrack/sampling/relaxation.h"
+#include "isotrack/surface/shapes.h"
+#include "support/particles.h"
+
+namespace isotrack {
+namespace {
+
+using support::adjacency_of;
+
+constexpr double kResolution = 0.01, kSpacing = 0.2;
+
+struct Pulled {
+    Crease crease;
+    Vec3 position, normal;
+};
+
+/// A particle there with neighbours there, all of the same spacing.
+Pulled pulled(const Surface& surface, const Vec3& place, const std::vector<Vec3>& neighbours) {
+    const auto probe = surface.probe();
+    Particles particles;
+    std::vector<int> number;
+    particles.add(place, probe->normal(place), kSpacing, 0);
+    for (const Vec3& p : neighbours) {
+        number.push_back(static_cast<int>(particles.size()));
+        particles.add(p, probe->normal(p), kSpacing, number.back());
+    }
+    const Crease crease = pull_to_crease(particles, {number.data(), number.data() + number.size()}, 0,
+                                         surface.resolution(), *probe);
+    return {crease, particles.position[0], particles.normal[0]};
+}
+
+TEST(PullToCrease, PutsOnTheEdgeWhatIsWithinReach) {
+    const auto box = shapes::box({0, 0, 0}, {1, 1, 1}, kResolution);
+    const Pulled result = pulled(*box, {1, 0.94, 0.3}, {{0.9, 1, 0.3}, {1, 0.8, 0.3}});
+    EXPECT_EQ(result.crease.kind, Crease::Kind::Line);
+    EXPECT_LT((result.position - Vec3(1, 1, 0.3)).norm(), 1e-4);
+    EXPECT_NEAR(std::abs(result.crease.along.z()), 1.0, 1e-6);
+}
+
+TEST(PullToCrease, PutsIntoTheCornerWhatIsWithinReach) {
+    const auto box = shapes::box({0, 0, 0}, {1, 1, 1}, kResolution);
+    const Pulled result = pulled(*box, {1, 0.98, 0.97}, {{0.9, 1, 0.9}, {0.9, 0.9, 1}});
+    EXPECT_EQ(result.crease.kind, Crease::Kind::Corner);
+    EXPECT_LT((result.position - Vec3(1, 1, 1)).norm(), 1e-4);
+}
+
+TEST(PullToCrease, LeavesAloneWhatIsFartherOrSmooth) {
+    const auto box = shapes::box({0, 0, 0}, {1, 1, 1}, kResolution);
+    const Vec3 beside(1, 1 - 0.45 * kSpacing, 0.3);
+    const Pulled far = pulled(*box, beside, {{0.9, 1, 0.3}, {1, 0.8, 0.3}});
+    EXPECT_EQ(far.crease.kind, Crease::Kind::None);
+    EXPECT_EQ(far.position, beside);
+
+    const auto sphere = shapes::sphere({0, 0, 0}, 0.5, kResolution);
+    const Vec3 top(0, 0, 0.5), turned = 0.5 * Vec3(0.4, 0, 0.9).normalized();
+    const Pulled round = pulled(*sphere, top, {turned});
+    EXPECT_EQ(round.crease.kind, Crease::Kind::None);
+    EXPECT_EQ(round.position, top);
+}
+
+TEST(Relax, LaysParticlesAlongCreasesAndClearOfThem) {
+    const auto box = shapes::box({0, 0, 0}, {1, 1, 1}, kResolution);
+    const auto probe = box->probe();
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> across(-1.0, 1.0);
+    constexpr double kOn = 0.02 * kSpacing;
+    Particles particles;
+    for (int i = 0; i < 690; ++i) {  // as many as hexagons of that spacing have on 24 units of area
+        Vec3 p(across(random), across(random), across(random));
+        p[i % 3] = i % 2 == 0 ? 1.0 : -1.0;
+        particles.add(p, probe->normal(p), kSpacing, i);
+    }
+    for (int round = 0; round < 8; ++round) relax(particles, adjacency_of(particles), *box, 3);
+
+    std::array<std::vector<double>, 4> on_edge;  // along the third axis
+    std::size_t between = 0;                     // neither on a crease nor clear of it
+    for (const Vec3& p : particles.position) {
+        std::array<double, 3> below = {1 - std::abs(p.x()), 1 - std::abs(p.y()), 1 - std::abs(p.z())};
+        if (std::max(below[0], below[1]) < kOn) on_edge[2 * (p.x() > 0) + (p.y() > 0)].push_back(p.z());
+        std::sort(below.begin(), below.end());
+        between += below[1] > kOn && below[1] < 0.35 * kSpacing;
+    }
+    EXPECT_LE(between, particles.size() / 50);  // when scattered: a seventh
+    for (auto& along : on_edge) {
+        std::sort(along.begin(), along.end());
+        ASSERT_GE(along.size(), 8U);
+        EXPECT_NEAR(along.front(), -1.0, 1.5 * kSpacing);
+        EXPECT_NEAR(along.back(), 1.0, 1.5 * kSpacing);
+        for (std::size_t i = 1; i < along.size(); ++i) EXPECT_LT(along[i] - along[i - 1], 2.2 * kSpacing);
+    }
+}
+
+}  // namespace
+}  // namespace isotrack
