@@ -13,8 +13,8 @@ constexpr double kReach = 0.4;        // of the spacing
 constexpr double kRoom = 0.8;         // of the spacing: nobody that near to where it goes
 constexpr double kStill = 0.02;       // of the spacing: one that moves less is there already
 constexpr int kWays = 8;
-constexpr double kLine = 0.03;   // second eigenvalue: a crease of 20 degrees through the middle
-constexpr double kCorner = 0.2;  // third: a small ball is none, the corner of a cube is
+constexpr double kLine = 0.03;    // second eigenvalue: a crease of 20 degrees through the middle
+constexpr double kCorner = 0.15;  // third: that of a cube has 0.2, a ball of two resolutions less than 0.1
 
 bool may_be_near_crease(const Particles& particles, Adjacency::Range neighbours, int i) {
     const double near = kNeighbourly * particles.spacing[i];
