@@ -94,7 +94,6 @@ Replaced BluntedMesh::replaced(std::vector<int> numbers) const {
         const Triangle& t = triangles[number];
         result.beside.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
     }
-    result.number = std::move(numbers);
     return result;
 }
 

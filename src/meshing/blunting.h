@@ -17,10 +17,9 @@ namespace isotrack {
 
 /// What a change would replace.
 struct Replaced {
-    std::vector<int> number;  ///< Ascending.
-    double facing;            ///< The least cosine between normals of its triangles and the surface's.
+    double facing;  ///< The least cosine between normals of its triangles and the surface's.
     std::vector<FacingTriangle> triangles;
-    std::vector<FacingTriangle> beside;  ///< With a vertex in common.
+    std::vector<FacingTriangle> beside;  ///< With a vertex in common when the pass began.
     Box box;
 };
 

@@ -40,7 +40,7 @@ Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, 
     const Vec3 p = particles.position[i], n = particles.normal[i];
     const double reach = kReach * particles.spacing[i], around = std::max(reach, resolution);
     const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
-    Mat3 normals = n * n.transpose();
+    Mat3 normals = n * n.transpose();  // of the normal equations, for moves from p, as is the pull
     Vec3 pull = Vec3::Zero();
     for (int way = 0; way < kWays; ++way) {
         const double angle = way * (2.0 * M_PI / kWays);

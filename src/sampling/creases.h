@@ -16,10 +16,12 @@ struct Crease {
 
 /// Moves particle i to the crease or the corner that passes within 0.4 of its spacing: to the nearest point
 /// that the tangent planes around it have in common, by least squares [Kobbelt et al. 2001; Ju et al. 2002],
-/// projected by O1. Two eigenvalues of the mean of n n^T over these planes tell a crease from what is smooth,
-/// the third tells its corners. Nothing moves where there is none, where none of the `neighbours` faces
-/// another way, where one of them is within 0.8 of the spacing of the place already (unless the particle is
-/// there), or where values are unknown.
+/// projected by O1. The planes are those of eight points at that distance, but one `resolution` at least
+/// (world units). Two eigenvalues of the mean of n n^T over them tell a crease from what is smooth, the third
+/// tells its corners; what bends more tightly than one and a half of its spacings counts as a crease, too.
+/// Nothing moves where there is none, where none of the `neighbours` faces another way, where one of them is
+/// within 0.8 of the spacing of the place already (unless the particle is there), or where values are
+/// unknown. Writes the particle alone, reads the neighbours.
 Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, double resolution,
                       Surface::Probe& probe);
 

@@ -24,7 +24,8 @@ struct DescentStep {
 /// `neighbours` that face the same way and are within 2 sigma, in the tangent plane, in the metric d^2 =
 /// (k_i^2 + k_j^2) / 2 |r|^2 with k = 1 / spacing, stretched as the particles say (`metrics`: of each);
 /// projected by O1; undone unless the energy falls. `lambda` is the particle's damping, kept from step to
-/// step. `along`, a unit vector: the only way to go, as on a crease.
+/// step. `along`, a unit vector: the only way to go, as on a crease; none when it is more
+/// than 60 degrees off the tangent plane.
 DescentStep descend(Particles& particles, const std::vector<Metric>& metrics, Adjacency::Range neighbours,
                     int i, double& lambda, Surface::Probe& probe, const Vec3* along = nullptr);
 

@@ -18,7 +18,7 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
     std::vector<Crease> crease(particles.size());
     int done = 0;
     const auto step = [&](int i, Surface::Probe& probe) {
-        // Who is on a crease in the first sweep stays on it.
+        // Who is on a crease in the first sweep is brought back to it in the next ones.
         if (done == 0 || crease[i].kind != Crease::Kind::None)
             crease[i] = pull_to_crease(particles, adjacency.of(i), i, surface.resolution(), probe);
         if (crease[i].kind == Crease::Kind::Corner) return false;

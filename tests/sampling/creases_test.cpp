@@ -55,12 +55,27 @@ TEST(PullToCrease, PutsIntoTheCornerWhatIsWithinReach) {
     EXPECT_LT((result.position - Vec3(1, 1, 1)).norm(), 1e-4);
 }
 
-TEST(PullToCrease, LeavesAloneWhatIsFartherOrSmooth) {
+TEST(PullToCrease, LeavesAloneWhereAnotherIsOrNobodyFacesAnotherWay) {
     const auto box = shapes::box({0, 0, 0}, {1, 1, 1}, kResolution);
+    const Vec3 place(1, 0.94, 0.3), across(0.9, 1, 0.3);
+    const Pulled taken = pulled(*box, place, {across, {1, 1, 0.3 + 0.7 * kSpacing}});
+    EXPECT_EQ(taken.crease.kind, Crease::Kind::None);
+    EXPECT_EQ(taken.position, place);
+    EXPECT_EQ(pulled(*box, place, {across, {1, 1, 0.3 + 0.9 * kSpacing}}).crease.kind, Crease::Kind::Line);
+    const Pulled flat = pulled(*box, place, {{1, 0.8, 0.3}});
+    EXPECT_EQ(flat.crease.kind, Crease::Kind::None);
+    EXPECT_EQ(flat.position, place);
+}
+
+TEST(PullToCrease, LeavesAloneWhatIsFartherOrSmooth) {
     const Vec3 beside(1, 1 - 0.45 * kSpacing, 0.3);
-    const Pulled far = pulled(*box, beside, {{0.9, 1, 0.3}, {1, 0.8, 0.3}});
-    EXPECT_EQ(far.crease.kind, Crease::Kind::None);
-    EXPECT_EQ(far.position, beside);
+    // Even where the resolution makes it look farther than it may go.
+    for (const double resolution : {kResolution, 0.6 * kSpacing}) {
+        const auto surface = shapes::box({0, 0, 0}, {1, 1, 1}, resolution);
+        const Pulled far = pulled(*surface, beside, {{0.9, 1, 0.3}, {1, 0.8, 0.3}});
+        EXPECT_EQ(far.crease.kind, Crease::Kind::None);
+        EXPECT_EQ(far.position, beside);
+    }
 
     const auto sphere = shapes::sphere({0, 0, 0}, 0.5, kResolution);
     const Vec3 top(0, 0, 0.5), turned = 0.5 * Vec3(0.4, 0, 0.9).normalized();

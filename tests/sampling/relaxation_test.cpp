@@ -129,18 +129,20 @@ TEST(Relax, LeavesMoreRoomAlongTheStretch) {
 }
 
 TEST(Relax, GivesTheSameBitsAtAnyThreadCount) {
-    const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.3, 0.05);
-    const auto run = [&](std::size_t threads) {
-        const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-        Particles particles;
-        Id next_id = 0;
-        cover(particles, *torus, CrossingGrid(*torus), limits_of(0.12), 1, next_id);
-        for (int round = 0; round < 3; ++round) relax(particles, adjacency_of(particles), *torus, 4);
-        return particles;
-    };
-    const Particles one = run(1), two = run(2);
-    EXPECT_EQ(one.position, two.position);
-    EXPECT_EQ(one.normal, two.normal);
+    for (const auto& surface :
+         {shapes::torus({0, 0, 0}, 1.0, 0.3, 0.05), shapes::box({0, 0, 0}, {0.5, 0.6, 0.7}, 0.05)}) {
+        const auto run = [&](std::size_t threads) {
+            const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+            Particles particles;
+            Id next_id = 0;
+            cover(particles, *surface, CrossingGrid(*surface), limits_of(0.12), 1, next_id);
+            for (int round = 0; round < 3; ++round) relax(particles, adjacency_of(particles), *surface, 4);
+            return particles;
+        };
+        const Particles one = run(1), two = run(2);
+        EXPECT_EQ(one.position, two.position);
+        EXPECT_EQ(one.normal, two.normal);
+    }
 }
 
 TEST(Relax, StopsWhenAllAreAtRest) {
