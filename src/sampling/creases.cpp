@@ -42,6 +42,7 @@ Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, 
     const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
     Mat3 normals = n * n.transpose();  // of the normal equations, for moves from p, as is the pull
     Vec3 pull = Vec3::Zero();
+    double turned = 0.0;  // squared sines, whose mean no second eigenvalue is above
     for (int way = 0; way < kWays; ++way) {
         const double angle = way * (2.0 * M_PI / kWays);
         const Vec3 to = around * (std::cos(angle) * a + std::sin(angle) * b);
@@ -51,8 +52,10 @@ Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, 
         const Vec3 m = f.gradient / slope;
         normals += m * m.transpose();
         pull += (m.dot(to) - f.value / slope) * m;
+        turned += 1.0 - m.dot(n) * m.dot(n);
     }
     const int planes = kWays + 1;
+    if (!(turned > planes * kLine)) return {};
     const Eigen::SelfAdjointEigenSolver<Mat3> spread(normals / planes);
     const Vec3& values = spread.eigenvalues();  // ascending
     if (!(values[1] > kLine)) return {};
