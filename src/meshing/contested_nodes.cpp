@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 
 namespace isotrack {
@@ -16,7 +17,7 @@ constexpr double kBeside[2] = {1.3e-7, 2.9e-7};
 
 /// Where a lattice line in the third direction meets the mesh.
 struct Hit {
-    int x, y, component;
+    int y, component;
     double z;
 };
 
@@ -40,31 +41,69 @@ private:
     double x_, y_, dx_, dy_, sign_;
 };
 
-std::vector<Hit> hits_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                         const std::vector<int>& component) {
-    constexpr std::size_t kBlock = 512;
-    std::vector<std::vector<Hit>> blocks((triangles.size() + kBlock - 1) / kBlock);
-    const auto add_hits = [&](std::size_t t, std::vector<Hit>& hits) {
-        const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]], &c = points[triangles[t][2]];
-        const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-        const Edge bc(b, c), ca(c, a), ab(a, b);
-        for (int x = static_cast<int>(std::ceil(low.x() - kBeside[0])); x + kBeside[0] <= high.x(); ++x)
-            for (int y = static_cast<int>(std::ceil(low.y() - kBeside[1])); y + kBeside[1] <= high.y(); ++y) {
-                const double px = x + kBeside[0], py = y + kBeside[1];
-                const double wa = bc.area2(px, py), wb = ca.area2(px, py), wc = ab.area2(px, py);
-                if (!((wa > 0.0 && wb > 0.0 && wc > 0.0) || (wa < 0.0 && wb < 0.0 && wc < 0.0))) continue;
-                hits.push_back({x, y, component[t], (wa * a.z() + wb * b.z() + wc * c.z()) / (wa + wb + wc)});
+/// The triangles over each layer of lines.
+class TrianglesByLayer {
+public:
+    TrianglesByLayer(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
+        std::vector<std::pair<int, int>> layers(triangles.size());  // the first, and the one behind the last
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 1024), [&](const auto& range) {
+            for (std::size_t t = range.begin(); t < range.end(); ++t) {
+                const auto [low, high] = std::minmax(
+                    {points[triangles[t][0]].x(), points[triangles[t][1]].x(), points[triangles[t][2]].x()});
+                layers[t] = {static_cast<int>(std::ceil(low - kBeside[0])),
+                             static_cast<int>(std::floor(high - kBeside[0])) + 1};
             }
-    };
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
-        const std::size_t end = std::min(triangles.size(), (block + 1) * kBlock);
-        for (std::size_t t = block * kBlock; t < end; ++t) add_hits(t, blocks[block]);
-    });
-    std::vector<Hit> hits;
-    for (auto& block : blocks) {
-        hits.insert(hits.end(), block.begin(), block.end());
-        std::vector<Hit>().swap(block);
+        });
+        bool any = false;
+        for (const auto& [begin, end] : layers) {
+            if (begin == end) continue;
+            low_x_ = any ? std::min(low_x_, begin) : begin;
+            end_x_ = any ? std::max(end_x_, end) : end;
+            any = true;
+        }
+        first_.assign(static_cast<std::size_t>(end_x_ - low_x_) + 1, 0);
+        for (const auto& [begin, end] : layers)
+            for (int x = begin; x < end; ++x) ++first_[x - low_x_ + 1];
+        std::partial_sum(first_.begin(), first_.end(), first_.begin());
+        std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+        triangles_.resize(first_.back());
+        for (std::size_t t = 0; t < layers.size(); ++t)
+            for (int x = layers[t].first; x < layers[t].second; ++x)
+                triangles_[next[x - low_x_]++] = static_cast<int>(t);
     }
+    int low_x() const { return low_x_; }
+    int end_x() const { return end_x_; }
+    bool empty() const { return triangles_.empty(); }
+    std::pair<const int*, const int*> layer(int x) const {
+        if (x < low_x_ || x >= end_x_) return {nullptr, nullptr};
+        const int* all = triangles_.data();
+        return {all + first_[x - low_x_], all + first_[x - low_x_ + 1]};
+    }
+
+private:
+    int low_x_ = 0, end_x_ = 0;
+    std::vector<std::size_t> first_;
+    std::vector<int> triangles_;
+};
+
+/// Where the lines of a layer meet the mesh, ascending by line and along it.
+std::vector<Hit> hits_in_layer(int x, const TrianglesByLayer& over, const std::vector<Vec3>& points,
+                               const std::vector<Triangle>& triangles, const std::vector<int>& component) {
+    std::vector<Hit> hits;
+    const double px = x + kBeside[0];
+    for (auto [t, end] = over.layer(x); t != end; ++t) {
+        const Vec3 &a = points[triangles[*t][0]], &b = points[triangles[*t][1]],
+                   &c = points[triangles[*t][2]];
+        const Edge bc(b, c), ca(c, a), ab(a, b);
+        const auto [low, high] = std::minmax({a.y(), b.y(), c.y()});
+        for (int y = static_cast<int>(std::ceil(low - kBeside[1])); y + kBeside[1] <= high; ++y) {
+            const double py = y + kBeside[1];
+            const double wa = bc.area2(px, py), wb = ca.area2(px, py), wc = ab.area2(px, py);
+            if (!((wa > 0.0 && wb > 0.0 && wc > 0.0) || (wa < 0.0 && wb < 0.0 && wc < 0.0))) continue;
+            hits.push_back({y, component[*t], (wa * a.z() + wb * b.z() + wc * c.z()) / (wa + wb + wc)});
+        }
+    }
+    sort_by_line(hits.data(), hits.data() + hits.size());
     return hits;
 }
 
@@ -97,10 +136,10 @@ struct Layer {
     std::vector<Line> lines;
 };
 
-Layer merge(const LatticeLayers<Hit>::Range& hits, const std::vector<std::atomic<char>>& holds_node,
+Layer merge(const std::vector<Hit>& hits, const std::vector<std::atomic<char>>& holds_node,
             const LatticeSides::Uprights::Range& uprights) {
     Layer layer;
-    auto [h, last_hit] = hits;
+    const Hit *h = hits.data(), *last_hit = h + hits.size();
     auto [u, last_upright] = uprights;
     const auto skip = [&, end = last_hit](const Hit* hit) {
         while (hit != end && !holds_node[hit->component].load(std::memory_order_relaxed)) ++hit;
@@ -141,28 +180,33 @@ bool is_contested(const Layer& layer, const Layer::Line& line, std::size_t pair,
 
 Contested contested_nodes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                           const std::vector<int>& component, int components, const LatticeSides& sides) {
-    const LatticeLayers<Hit> hits(hits_of(points, triangles, component));
+    const TrianglesByLayer over(points, triangles);
     const LatticeSides::Uprights& uprights = sides.uprights();
-    if (hits.empty() && uprights.empty()) return {{}, std::vector<char>(components, 0)};
-    const int low_x = hits.empty()       ? uprights.low_x()
-                      : uprights.empty() ? hits.low_x()
-                                         : std::min(hits.low_x(), uprights.low_x());
+    if (over.empty() && uprights.empty()) return {{}, std::vector<char>(components, 0)};
+    const int low_x = over.empty()       ? uprights.low_x()
+                      : uprights.empty() ? over.low_x()
+                                         : std::min(over.low_x(), uprights.low_x());
     const int end_x =
-        std::max(hits.empty() ? low_x : hits.end_x(), uprights.empty() ? low_x : uprights.end_x());
+        std::max(over.empty() ? low_x : over.end_x(), uprights.empty() ? low_x : uprights.end_x());
 
+    std::vector<std::vector<Hit>> hits(static_cast<std::size_t>(end_x - low_x));
     std::vector<std::atomic<char>> holds_node(components);  // flagged by several threads
     tbb::parallel_for(low_x, end_x, [&](int x) {
+        std::vector<Hit>& of_layer = hits[x - low_x];
+        of_layer = hits_in_layer(x, over, points, triangles, component);
         std::vector<char> paired;
-        auto [line, end] = hits.layer(x);
+        const Hit *line = of_layer.data(), *end = line + of_layer.size();
         while (line != end) {
             const Hit* next = std::find_if(line, end, [&](const Hit& h) { return h.y != line->y; });
             flag_holders(line, next, paired, holds_node);
             line = next;
         }
     });
-    std::vector<Layer> layers(static_cast<std::size_t>(end_x - low_x));
+    std::vector<Layer> layers(hits.size());
     tbb::parallel_for(low_x, end_x, [&](int x) {
-        layers[x - low_x] = merge(hits.layer(x), holds_node, uprights.layer(x));
+        std::vector<Hit>& of_layer = hits[x - low_x];
+        layers[x - low_x] = merge(of_layer, holds_node, uprights.layer(x));
+        std::vector<Hit>().swap(of_layer);
     });
 
     std::vector<std::vector<Node>> contested(layers.size());
