@@ -77,6 +77,15 @@ std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector
     return result;
 }
 
+void Inspector::restart() {
+    expected_.reset();
+    facets_.clear();
+    errors_.reset();
+    distances_.clear();
+    missed_.clear();
+    looks_ = 0;
+}
+
 void Inspector::expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles) {
     expected_.emplace(Expected{{particles.size(), triangles}, {}});
     expected_->errors = triangle_errors(particles, expected_->triangles.triangles(), surface_, kStepsByLength,
@@ -110,14 +119,21 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     const auto errors =
         triangle_errors(mesh.vertices, fresh, surface_, kStepsByLength, kSuspect * limits_.tolerance);
     auto next = errors.begin();
+    for (const TriangleError*& error : known)
+        if (!error) error = &*next++;
+    const auto measured = std::make_shared<std::vector<TriangleError>>(facets.size());
+    std::vector<char> too_far(facets.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, facets.size(), 1024), [&](const auto& range) {
+        for (std::size_t f = range.begin(); f < range.end(); ++f) {
+            (*measured)[f] = *known[f];
+            too_far[f] = known[f]->largest > kCertified * limits_.tolerance;
+        }
+    });
     std::vector<Vec3> in_vain;
     const auto probe = surface_.probe();
-    const auto measured = std::make_shared<std::vector<TriangleError>>(facets.size());
-    for (std::size_t f = 0; f < facets.size(); ++f) {
-        const TriangleError& error = (*measured)[f] = known[f] ? *known[f] : *next++;
-        if (error.largest > kCertified * limits_.tolerance && (seen[f] || !probe->project(error.where)))
-            in_vain.push_back(error.where);
-    }
+    for (std::size_t f = 0; f < facets.size(); ++f)
+        if (too_far[f] && (seen[f] || !probe->project((*measured)[f].where)))
+            in_vain.push_back((*measured)[f].where);
     facets_ = std::move(facets);
     errors_ = result.errors = measured;
     expected_.reset();  // vertices may move from now on
@@ -243,8 +259,12 @@ void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspectio
                                        kLeastDoubtful * surface_.resolution()});
 }
 
-void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {
+void Inspector::prepare_topology() {
     if (!sides_) sides_.emplace(surface_);
+}
+
+void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {
+    prepare_topology();
     inspection.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, *sides_);
     doubt(inspection.topology.faults, looks_ == 0 ? kFaultSpacing : kVainSpacing, inspection);
     if (looks_ <= 1) {

@@ -44,6 +44,8 @@ public:
     Inspector(const Surface& surface, const SizingLimits& limits, const CrossingGrid& crossings)
         : surface_(surface), limits_(limits), crossings_(crossings) {}
 
+    /// From now on come meshes of other particles: those before are forgotten.
+    void restart();
     /// Before the first mesh is there: measures triangles that it is likely to have. Where it does, with
     /// vertices on these very places, nothing is measured again.
     void expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles);
@@ -52,6 +54,8 @@ public:
     Inspection inspect(const FrameMesh& mesh);
     /// From mesh to surface and back.
     Inspection inspect_both_ways(const FrameMesh& mesh);
+    /// What looking at the topology needs of the surface alone; done then if not before.
+    void prepare_topology();
     /// The topology of the mesh just inspected.
     void inspect_topology(const FrameMesh& mesh, Inspection& inspection);
 

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
-#include <unordered_set>
 
 #include "delaunay/spatial_order.h"
 #include "isotrack/delaunay/tetrahedralisation.h"
@@ -324,7 +323,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     frame.tolerance = l.tolerance;
     frame.delaunay_strategy = name_of(strategy());
     const std::size_t relocated = dt->profile().relocated;
-    const std::vector<Id> before = particles.id;
+    const std::size_t before = particles.size();
     const bool warm = !particles.empty();
     const Id first_new = next_id;
     {
@@ -357,20 +356,23 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     const std::size_t crossing_count = work->crossings->size();
     // As long as many particles have to be added their surroundings make room for them.
     std::size_t added = 0;
+    std::optional<Densifier> densifier;
+    inspector.emplace(surface, l, *work->crossings);
     for (int mending = 0;; ++mending) {
-        inspector.emplace(surface, l, *work->crossings);
-        std::function<void()> measure_expected;
-        if (!options.fit && options.method != Method::Paper)
-            measure_expected = [&] { inspector->expect(particles.position, last_mesh.triangles); };
-        tetrahedralise(true, seconds, measure_expected);
+        inspector->restart();
+        tetrahedralise(true, seconds, [&] {
+            if (!options.fit && options.method != Method::Paper)
+                inspector->expect(particles.position, last_mesh.triangles);
+            inspector->prepare_topology();
+        });
         fitted = {};
         make_mesh();
         const StageTimer timer(seconds, "certify");
         if (options.method == Method::Paper) break;
         inspection = mending == 0 ? inspector->inspect(mesh) : inspector->inspect_both_ways(mesh);
         last_mesh.evidence.error = errors_at_particles(mesh, *inspection.errors, particles.size());
-        Densifier once = make_densifier(surface, l, crossing_count);
-        added = mend(mesh, inspection, surface, l, once);
+        densifier.emplace(make_densifier(surface, l, crossing_count));
+        added = mend(mesh, inspection, surface, l, *densifier);
         if (mending == kMostMendings ||
             static_cast<double>(added) < kFew * static_cast<double>(particles.size()))
             break;
@@ -383,14 +385,13 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
                          options.reconstruction == Reconstruction::Guided &&
                          options.delaunay != UpdateStrategy::Rebuild;
     // The topology, which takes longer to look at, is looked at when all else passes.
-    Densifier densifier = make_densifier(surface, l, crossing_count);
     int relabellings = 0;
     for (int round = 0;; ++round) {
         if (round > 0 || added > 0) {
             tetrahedralise(false, seconds);
             if (refines) {
                 const StageTimer timer(seconds, "certify");
-                refine(*dt, labels, particles, densifier, surface, l);
+                refine(*dt, labels, particles, *densifier, surface, l);
                 in_dt = particles.id;
             }
             make_mesh();
@@ -399,7 +400,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         const bool last = options.method == Method::Paper || round == kCertifyRounds;
         const auto passes = [&] {
             if (last) return true;
-            if (mend(mesh, inspection, surface, l, densifier) > 0) return false;
+            if (mend(mesh, inspection, surface, l, *densifier) > 0) return false;
             if (options.reconstruction != Reconstruction::Guided || relabellings == kMostRelabellings)
                 return true;
             ++relabellings;
@@ -443,9 +444,8 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         frame.mesh.velocities.push_back(p >= 0 ? particles.velocity[p] : Vec3::Zero());
     }
     frame.particles = particles.size();
-    const std::unordered_set<Id> now(particles.id.begin(), particles.id.end());
     for (const Id id : particles.id) frame.born += id >= first_new;
-    for (const Id id : before) frame.died += now.count(id) == 0;
+    frame.died = before + frame.born - particles.size();
     if (options.border == Border::Close) return [work, options = options] { return work->finish(options); };
 
     frame = work->finish(options);  // ids of what is cut open are given in the order of the frames
