@@ -25,7 +25,13 @@ public:
                     if (!labels[cells.neighbour(c, k)]) blocks[block].push_back({static_cast<int>(c), k});
             }
         });
-        for (const auto& block : blocks) facets_.insert(facets_.end(), block.begin(), block.end());
+        std::vector<std::size_t> first{0};
+        for (const auto& block : blocks) first.push_back(first.back() + block.size());
+        facets_.resize(first.back());
+        tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
+            std::copy(blocks[block].begin(), blocks[block].end(),
+                      facets_.begin() + static_cast<std::ptrdiff_t>(first[block]));
+        });
     }
     struct Facet {
         int cell, k;
@@ -103,14 +109,19 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     const auto& facets = boundary.facets();
     const std::size_t count = facets.size();
     CarvedSurface result;
+    const auto for_each_facet = [&](const auto& body) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1024), [&](const auto& range) {
+            for (std::size_t f = range.begin(); f < range.end(); ++f) body(f);
+        });
+    };
     result.triangles.resize(count);
-    result.inside_cell.reserve(count);
-    result.inside_facet.reserve(count);
-    for (std::size_t f = 0; f < count; ++f) {
+    result.inside_cell.resize(count);
+    result.inside_facet.resize(count);
+    for_each_facet([&](std::size_t f) {
         result.triangles[f] = boundary.particles(f);
-        result.inside_cell.push_back(facets[f].cell);
-        result.inside_facet.push_back(facets[f].k);
-    }
+        result.inside_cell[f] = facets[f].cell;
+        result.inside_facet[f] = facets[f].k;
+    });
     const std::vector<Triangle> in_particles = result.triangles;
     const Corners corners(points.size(), in_particles);
     std::vector<char> tangled(points.size());
@@ -155,8 +166,9 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     std::vector<int> vertex_of(points.size(), -1);
     for (std::size_t v = 0; v < result.particle.size(); ++v)
         vertex_of[result.particle[v]] = static_cast<int>(v);
-    for (Triangle& t : result.triangles)
-        for (int& v : t) v = vertex_of[v];
+    for_each_facet([&](std::size_t f) {
+        for (int& v : result.triangles[f]) v = vertex_of[v];
+    });
     for (const Copy& copy : copies) {
         for (const int c : copy.cycle)
             result.triangles[c / 3][c % 3] = static_cast<int>(result.particle.size());

@@ -37,13 +37,17 @@ Adjacency Adjacency::restricted(const std::vector<char>& keep) const {
     return result;
 }
 
-Adjacency from_pairs(const std::vector<std::pair<int, int>>& pairs, std::size_t count) {
+namespace {
+
+/// `for_each_pair(visit)` calls visit(i, j) for every directed pair, in the same order whenever it is called.
+template <typename ForEachPair>
+Adjacency gather(std::size_t count, const ForEachPair& for_each_pair) {
     // All lists with their repeats, then each sorted and made unique in its place.
     std::vector<int> first(count + 1, 0);
-    for (const auto& p : pairs) ++first[p.first + 1];
+    for_each_pair([&](int i, int) { ++first[i + 1]; });
     for (std::size_t i = 0; i < count; ++i) first[i + 1] += first[i];
-    std::vector<int> second(pairs.size()), end(first.begin(), first.end() - 1);
-    for (const auto& p : pairs) second[end[p.first]++] = p.second;
+    std::vector<int> second(first[count]), end(first.begin(), first.end() - 1);
+    for_each_pair([&](int i, int j) { second[end[i]++] = j; });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1024), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             const auto from = second.begin() + first[i];
@@ -52,23 +56,33 @@ Adjacency from_pairs(const std::vector<std::pair<int, int>>& pairs, std::size_t 
         }
     });
     Adjacency result;
-    result.first.reserve(count + 1);
-    for (std::size_t i = 0; i < count; ++i) {
-        result.adjacent.insert(result.adjacent.end(), second.begin() + first[i], second.begin() + end[i]);
-        result.first.push_back(static_cast<int>(result.adjacent.size()));
-    }
+    result.first.resize(count + 1);
+    for (std::size_t i = 0; i < count; ++i) result.first[i + 1] = result.first[i] + end[i] - first[i];
+    result.adjacent.resize(result.first[count]);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1024), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+            std::copy(second.begin() + first[i], second.begin() + end[i],
+                      result.adjacent.begin() + result.first[i]);
+    });
     return result;
 }
 
+}  // namespace
+
+Adjacency from_pairs(const std::vector<std::pair<int, int>>& pairs, std::size_t count) {
+    return gather(count, [&](const auto& visit) {
+        for (const auto& [i, j] : pairs) visit(i, j);
+    });
+}
+
 Adjacency ring_of(const std::vector<std::array<int, 3>>& triangles, std::size_t count) {
-    std::vector<std::pair<int, int>> pairs;
-    pairs.reserve(6 * triangles.size());
-    for (const auto& [a, b, c] : triangles)
-        for (const auto& [i, j] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) {
-            pairs.emplace_back(i, j);
-            pairs.emplace_back(j, i);
-        }
-    return from_pairs(pairs, count);
+    return gather(count, [&](const auto& visit) {
+        for (const auto& [a, b, c] : triangles)
+            for (const auto& [i, j] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) {
+                visit(i, j);
+                visit(j, i);
+            }
+    });
 }
 
 Adjacency Adjacency::extended(const std::vector<std::array<int, 3>>& newborn, std::size_t count) const {
@@ -77,16 +91,15 @@ Adjacency Adjacency::extended(const std::vector<std::array<int, 3>>& newborn, st
         result.first.resize(count + 1, result.first.back());
         return result;
     }
-    std::vector<std::pair<int, int>> pairs;
-    pairs.reserve(adjacent.size() + 6 * newborn.size());
-    for (std::size_t i = 0; i < size(); ++i)
-        for (const int j : of(i)) pairs.emplace_back(static_cast<int>(i), j);
-    for (std::size_t k = 0; k < newborn.size(); ++k)
-        for (const int j : newborn[k]) {
-            pairs.emplace_back(static_cast<int>(size() + k), j);
-            pairs.emplace_back(j, static_cast<int>(size() + k));
-        }
-    return from_pairs(pairs, count);
+    return gather(count, [&](const auto& visit) {
+        for (std::size_t i = 0; i < size(); ++i)
+            for (const int j : of(i)) visit(static_cast<int>(i), j);
+        for (std::size_t k = 0; k < newborn.size(); ++k)
+            for (const int j : newborn[k]) {
+                visit(static_cast<int>(size() + k), j);
+                visit(j, static_cast<int>(size() + k));
+            }
+    });
 }
 
 Adjacency Adjacency::squared() const {
@@ -119,10 +132,13 @@ Adjacency Adjacency::squared() const {
     });
     Adjacency result;
     result.first.reserve(first.size());
-    for (const Block& block : blocks) {
-        result.adjacent.insert(result.adjacent.end(), block.adjacent.begin(), block.adjacent.end());
+    for (const Block& block : blocks)
         for (const int count : block.count) result.first.push_back(result.first.back() + count);
-    }
+    result.adjacent.resize(result.first.back());
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+        std::copy(blocks[b].adjacent.begin(), blocks[b].adjacent.end(),
+                  result.adjacent.begin() + result.first[b * kBlock]);
+    });
     return result;
 }
 

@@ -1,5 +1,7 @@
 #include "isotrack/sampling/population.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,19 +17,38 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kEmpty =
     0.8;  // of the spacing: nearest neighbour of a birth; its triangle may be none of the DT any more
 
+namespace {
+
+/// The numbers below `count` whose `measure(number)` is less than `limit`, by that, ascending.
+template <typename Measure>
+std::vector<std::pair<double, int>> smallest_first(std::size_t count, const Measure& measure, double limit) {
+    constexpr std::size_t kBlock = 4096;
+    std::vector<std::vector<std::pair<double, int>>> blocks((count + kBlock - 1) / kBlock);
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+        for (std::size_t i = b * kBlock; i < std::min(count, (b + 1) * kBlock); ++i)
+            if (const double value = measure(i); value < limit)
+                blocks[b].emplace_back(value, static_cast<int>(i));
+    });
+    std::vector<std::pair<double, int>> result;
+    for (const auto& block : blocks) result.insert(result.end(), block.begin(), block.end());
+    std::sort(result.begin(), result.end());
+    return result;
+}
+
+}  // namespace
+
 std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency,
                             const PopulationBand& band) {
-    std::vector<std::pair<double, int>> crowded;
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-        double q = 1e300;  // squared
+    const auto nearest_square = [&](std::size_t i) {
+        double q = 1e300;
         for (const int j : adjacency.of(i)) {
             if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
             const Vec3 r = particles.position[j] - particles.position[i];
             q = std::min(q, 0.5 * (metric_of(particles, i).square(r) + metric_of(particles, j).square(r)));
         }
-        if (q < band.crowded * band.crowded) crowded.emplace_back(q, static_cast<int>(i));
-    }
-    std::sort(crowded.begin(), crowded.end());
+        return q;
+    };
+    const auto crowded = smallest_first(particles.size(), nearest_square, band.crowded * band.crowded);
     std::vector<char> keep(particles.size(), 1);
     for (const auto& [q, i] : crowded) {
         bool neighbour_went = false;
@@ -78,14 +99,11 @@ struct MetricTriangle {
 std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triangle>& triangles,
                                   const Adjacency& ring, const Surface& surface, Id& next_id,
                                   const PopulationBand& band) {
-    std::vector<std::pair<double, int>> large;
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const auto minus_radius = [&](std::size_t t) {
         const MetricTriangle triangle(particles, triangles[t]);
-        if (!(triangle.area2_16 > 0.0)) continue;
-        const double radius = triangle.circumradius();
-        if (radius > band.sparse) large.emplace_back(-radius, static_cast<int>(t));
-    }
-    std::sort(large.begin(), large.end());
+        return triangle.area2_16 > 0.0 ? -triangle.circumradius() : 0.0;
+    };
+    const auto large = smallest_first(triangles.size(), minus_radius, -band.sparse);
     std::vector<char> touched(particles.size(), 0);
     const auto probe = surface.probe();
     std::vector<Triangle> parents;

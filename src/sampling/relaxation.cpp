@@ -2,6 +2,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+
 #include "sampling/creases.h"
 #include "sampling/descent.h"
 #include "surface/thread_probes.h"
@@ -12,6 +14,7 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
     const auto groups = colour_groups(adjacency);
     ThreadProbes probes(surface);
     std::vector<Metric> metrics;
+    metrics.reserve(particles.size());
     for (std::size_t i = 0; i < particles.size(); ++i) metrics.push_back(metric_of(particles, i));
     std::vector<double> lambda(particles.size(), 0.1);
     std::vector<char> moved(particles.size(), 1), active(particles.size(), 1);
@@ -28,13 +31,15 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
     };
     for (; done < sweeps; ++done) {
         if (done > 0) {
-            bool any = false;
-            for (std::size_t i = 0; i < particles.size(); ++i) {
-                active[i] = moved[i];
-                for (const int j : adjacency.of(i)) active[i] = active[i] || moved[j];
-                any = any || active[i];
-            }
-            if (!any) break;
+            if (std::find(moved.begin(), moved.end(), 1) == moved.end()) break;
+            tbb::parallel_for(
+                tbb::blocked_range<std::size_t>(0, active.size(), 1024), [&](const auto& range) {
+                    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                        const Adjacency::Range near = adjacency.of(i);
+                        active[i] = moved[i] || std::any_of(near.begin(), near.end(),
+                                                            [&](int j) { return moved[j] != 0; });
+                    }
+                });
         }
         for (const auto& group : groups)
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, group.size(), 64), [&](const auto& range) {

@@ -1,7 +1,9 @@
 #include "isotrack/surface/crossing_grid.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
+#include <atomic>
 #include <cmath>
 #include <tuple>
 
@@ -11,8 +13,14 @@ CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, doub
     : spacing_(spacing), width_(2.0 * spacing) {
     constexpr double kColumnsPerCrossing = 4.0;
     if (crossings.empty()) return;
-    Box box;
-    for (const auto& c : crossings) box.extend(c.point);
+    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size(), 4096);
+    const Box box = tbb::parallel_reduce(
+        range_of_all, Box(),
+        [&](const auto& range, Box sum) {
+            for (std::size_t c = range.begin(); c < range.end(); ++c) sum.extend(crossings[c].point);
+            return sum;
+        },
+        [](const Box& a, const Box& b) { return a.merged(b); });
     origin_ = box.min();
     const double most = kColumnsPerCrossing * static_cast<double>(crossings.size());
     const Vec3 size = box.sizes();
@@ -21,33 +29,41 @@ CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, doub
 
     const std::size_t columns = static_cast<std::size_t>(count_[0]) * count_[1];
     first_.assign(columns + 1, 0);
+    for (const auto& c : crossings)
+        if (std::find(directions_.begin(), directions_.end(), c.outward) == directions_.end())
+            directions_.push_back(c.outward);
     const auto entry_of = [&](const Surface::Crossing& c) {
-        return Entry{(c.point - origin_).cast<float>(), direction_of(c.outward)};
+        const auto known = std::find(directions_.begin(), directions_.end(), c.outward);
+        return Entry{(c.point - origin_).cast<float>(),
+                     static_cast<std::uint32_t>(known - directions_.begin())};
     };
-    for (const auto& c : crossings) ++first_[column_of(entry_of(c)) + 1];
-    for (std::size_t c = 0; c < columns; ++c) first_[c + 1] += first_[c];
-    std::vector<std::size_t> end(first_.begin(), first_.end() - 1);
-    entries_.resize(crossings.size());
-    for (const auto& c : crossings) {
-        const Entry entry = entry_of(c);
-        entries_[end[column_of(entry)]++] = entry;
+    // Each goes to the next free place of its column, in any order: they are sorted then.
+    std::vector<std::atomic<std::uint32_t>> next(columns);
+    tbb::parallel_for(range_of_all, [&](const auto& range) {
+        for (std::size_t c = range.begin(); c < range.end(); ++c)
+            next[column_of(entry_of(crossings[c]))].fetch_add(1, std::memory_order_relaxed);
+    });
+    for (std::size_t c = 0; c < columns; ++c) {
+        first_[c + 1] = first_[c] + next[c].load(std::memory_order_relaxed);
+        next[c].store(0, std::memory_order_relaxed);
     }
+    entries_.resize(crossings.size());
+    tbb::parallel_for(range_of_all, [&](const auto& range) {
+        for (std::size_t c = range.begin(); c < range.end(); ++c) {
+            const Entry entry = entry_of(crossings[c]);
+            const std::size_t column = column_of(entry);
+            entries_[first_[column] + next[column].fetch_add(1, std::memory_order_relaxed)] = entry;
+        }
+    });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns, 256), [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c)
             std::sort(entries_.begin() + static_cast<std::ptrdiff_t>(first_[c]),
                       entries_.begin() + static_cast<std::ptrdiff_t>(first_[c + 1]),
                       [](const Entry& a, const Entry& b) {
-                          return std::make_tuple(a.offset.z(), a.offset.x(), a.offset.y()) <
-                                 std::make_tuple(b.offset.z(), b.offset.x(), b.offset.y());
+                          return std::make_tuple(a.offset.z(), a.offset.x(), a.offset.y(), a.direction) <
+                                 std::make_tuple(b.offset.z(), b.offset.x(), b.offset.y(), b.direction);
                       });
     });
-}
-
-std::uint32_t CrossingGrid::direction_of(const Eigen::Vector3f& outward) {
-    const auto known = std::find(directions_.begin(), directions_.end(), outward);
-    const auto number = static_cast<std::uint32_t>(known - directions_.begin());
-    if (known == directions_.end()) directions_.push_back(outward);
-    return number;
 }
 
 std::vector<char> CrossingGrid::columns_of(const std::vector<int>& some) const {

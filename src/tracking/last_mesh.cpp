@@ -1,6 +1,9 @@
 #include "tracking/last_mesh.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <utility>
 
@@ -11,17 +14,25 @@ namespace {
 
 /// The distance to the nearest Delaunay neighbour that faces the other way.
 std::vector<double> thickness_of(const Particles& particles, const Tetrahedra& cells) {
-    std::vector<double> th(particles.size(), std::numeric_limits<double>::infinity());
-    for (const auto& cell : cells.vertices)
-        for (int a = 0; a < 4; ++a)
-            for (int b = a + 1; b < 4; ++b) {
-                const int i = cell[a], j = cell[b];
-                if (i < 0 || j < 0 || !(particles.normal[i].dot(particles.normal[j]) < 0.0)) continue;
-                const double apart = (particles.position[i] - particles.position[j]).norm();
-                th[i] = std::min(th[i], apart);
-                th[j] = std::min(th[j], apart);
-            }
-    return th;
+    std::vector<std::atomic<double>> th(particles.size());  // lowered by several threads
+    for (auto& own : th) own.store(std::numeric_limits<double>::infinity(), std::memory_order_relaxed);
+    const auto lower = [](std::atomic<double>& own, double to) {
+        double at = own.load(std::memory_order_relaxed);
+        while (to < at && !own.compare_exchange_weak(at, to, std::memory_order_relaxed)) {
+        }
+    };
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells.size(), 4096), [&](const auto& range) {
+        for (std::size_t c = range.begin(); c < range.end(); ++c)
+            for (int a = 0; a < 4; ++a)
+                for (int b = a + 1; b < 4; ++b) {
+                    const int i = cells.vertices[c][a], j = cells.vertices[c][b];
+                    if (i < 0 || j < 0 || !(particles.normal[i].dot(particles.normal[j]) < 0.0)) continue;
+                    const double apart = (particles.position[i] - particles.position[j]).norm();
+                    lower(th[i], apart);
+                    lower(th[j], apart);
+                }
+    });
+    return {th.begin(), th.end()};
 }
 
 }  // namespace

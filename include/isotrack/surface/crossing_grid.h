@@ -71,7 +71,6 @@ private:
         Eigen::Vector3f offset;   // from origin_
         std::uint32_t direction;  // number among directions_
     };
-    std::uint32_t direction_of(const Eigen::Vector3f& outward);
     int column(int axis, double offset) const {
         return static_cast<int>(std::clamp(offset / width_, 0.0, static_cast<double>(count_[axis] - 1)));
     }
