@@ -81,16 +81,21 @@ void IncrementalDelaunay::insert(int vertex, int cell) {
     corner_of_.resize(points.size() + 1, kNone);
     freed_.assign(1, cell);
     rim_.clear();
-    marks_[cell] = kConflict;
-    for (std::size_t i = 0; i < freed_.size(); ++i)
+    char* const marks = marks_.data();
+    const auto* const links = cells_.links.data();
+    marks[cell] = kConflict;
+    for (std::size_t i = 0; i < freed_.size(); ++i) {
+        const int from = freed_[i];
         for (int k = 0; k < 4; ++k) {
-            const int other = cells_.neighbour(freed_[i], k);
-            if (marks_[other] == kUnseen) {
-                marks_[other] = in_conflict(other, p) ? kConflict : kRim;
-                if (marks_[other] == kConflict) freed_.push_back(other);
+            const int other = links[from][k] >> 2;
+            char mark = marks[other];
+            if (mark == kUnseen) {
+                mark = marks[other] = in_conflict(other, p) ? kConflict : kRim;
+                if (mark == kConflict) freed_.push_back(other);
             }
-            if (marks_[other] == kRim) rim_.push_back({freed_[i], k});
+            if (mark == kRim) rim_.push_back({from, k});
         }
+    }
 
     // A cell on every facet of the rim. They meet at the facets between the new vertex and the edges of the
     // rim, each of which two facets have, in opposite directions.
@@ -98,13 +103,15 @@ void IncrementalDelaunay::insert(int vertex, int cell) {
     const std::size_t count = rim_.size() / 2 + 2;  // of vertices on the rim, by Euler's formula
     constexpr std::size_t kMostInTable = 256;       // a vertex far outside sees half the hull
     const bool in_table = count <= kMostInTable;
-    if (in_table) edges_.resize(count * count);
+    if (in_table && edges_.size() < count * count) edges_.resize(count * count);
     std::unordered_map<std::size_t, int> many;
+    int* const table = edges_.data();
     const auto edge = [&](int from, int to) -> int& {
-        const std::size_t key = count * corner(from) + corner(to);
-        return in_table ? edges_[key] : many[key];
+        const std::size_t key = count * from + to;
+        return in_table ? table[key] : many[key];
     };
     fresh_.clear();
+    on_rim_.clear();
     for (const Facet& facet : rim_) {
         const int slot = new_slot(), outside = cells_.links[facet.cell][facet.k];
         fresh_.push_back(slot);
@@ -115,13 +122,15 @@ void IncrementalDelaunay::insert(int vertex, int cell) {
         cells_.links[outside >> 2][outside & 3] = Tetrahedra::link(slot, facet.k);
         marks_[outside >> 2] = kUnseen;
         const auto& f = Tetrahedra::kFacet[facet.k];
-        for (int j = 0; j < 3; ++j) edge(v[f[j]], v[f[(j + 1) % 3]]) = Tetrahedra::link(slot, f[(j + 2) % 3]);
+        auto& c = on_rim_.emplace_back();
+        for (int j = 0; j < 3; ++j) c[j] = corner(v[f[j]]);
+        for (int j = 0; j < 3; ++j) edge(c[j], c[(j + 1) % 3]) = Tetrahedra::link(slot, f[(j + 2) % 3]);
     }
     for (std::size_t i = 0; i < rim_.size(); ++i) {
-        const int slot = fresh_[i];
-        const auto& v = cells_.vertices[slot];
         const auto& f = Tetrahedra::kFacet[rim_[i].k];
-        for (int j = 0; j < 3; ++j) cells_.links[slot][f[(j + 2) % 3]] = edge(v[f[(j + 1) % 3]], v[f[j]]);
+        const auto& c = on_rim_[i];
+        auto& own = cells_.links[fresh_[i]];
+        for (int j = 0; j < 3; ++j) own[f[(j + 2) % 3]] = edge(c[(j + 1) % 3], c[j]);
     }
     for (const int w : corners_) corner_of_[w + 1] = kNone;
     for (const int slot : freed_) free_slot(slot);

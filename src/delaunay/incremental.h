@@ -60,6 +60,7 @@ private:
     std::vector<Facet> rim_;
     std::vector<int> fresh_, freed_;
     std::vector<int> corners_, corner_of_, edges_;
+    std::vector<std::array<int, 3>> on_rim_;  // the corners of each facet of the rim
 };
 
 }  // namespace isotrack

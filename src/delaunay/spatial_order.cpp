@@ -26,11 +26,11 @@ struct ByNumber {
 }  // namespace
 
 void sort_spatially(const std::vector<Vec3>& points, std::vector<int>& order) {
-    CGAL::spatial_sort(order.begin(), order.end(), ByNumber{points});
+    CGAL::spatial_sort<CGAL::Parallel_if_available_tag>(order.begin(), order.end(), ByNumber{points});
 }
 
 void sort_along_curve(const std::vector<Vec3>& points, std::vector<int>& order) {
-    CGAL::hilbert_sort(order.begin(), order.end(), ByNumber{points});
+    CGAL::hilbert_sort<CGAL::Parallel_if_available_tag>(order.begin(), order.end(), ByNumber{points});
 }
 
 }  // namespace isotrack
