@@ -130,8 +130,7 @@ bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replac
     if (!(facing(candidates) > std::min(kFacing, before.facing))) return false;
     const auto is_near = [&](const Triangle& t) {
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-        return triangle_error(a, b, c, probe, error_steps(a, b, c, resolution), 0.5 * tolerance).largest <=
-               tolerance;
+        return certified_error(a, b, c, probe, resolution, 0.5 * tolerance).largest <= tolerance;
     };
     return std::all_of(candidates.begin(), candidates.end(), is_near) && reach_what(before, candidates);
 }

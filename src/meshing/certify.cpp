@@ -100,6 +100,15 @@ int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution) 
     return static_cast<int>(std::clamp<double>(wanted, kFewestSteps, kMostSteps));
 }
 
+TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
+                              double resolution, double refine_above) {
+    const int steps = error_steps(a, b, c, resolution);
+    const TriangleError error = triangle_error(a, b, c, probe, steps, refine_above);
+    if (steps == kMostSteps || !(error.largest > kAlmost * refine_above)) return error;
+    const TriangleError again = triangle_error(a, b, c, probe, kMostSteps, refine_above);
+    return again.largest > error.largest ? again : error;
+}
+
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps, double refine_above) {
@@ -110,13 +119,9 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
             const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
                        &c = points[triangles[t][2]];
-            const int first = steps == kStepsByLength ? error_steps(a, b, c, surface.resolution()) : steps;
-            errors[t] = triangle_error(a, b, c, probe, first, refine_above);
-            if (steps != kStepsByLength || first == kMostSteps ||
-                !(errors[t].largest > kAlmost * refine_above))
-                continue;
-            const TriangleError again = triangle_error(a, b, c, probe, kMostSteps, refine_above);
-            if (again.largest > errors[t].largest) errors[t] = again;
+            errors[t] = steps == kStepsByLength
+                            ? certified_error(a, b, c, probe, surface.resolution(), refine_above)
+                            : triangle_error(a, b, c, probe, steps, refine_above);
         }
     });
     return errors;

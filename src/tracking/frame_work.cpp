@@ -51,13 +51,17 @@ void FrameWork::blunt() {
         return places;
     };
     const auto before = missed();
-    // What is missed now but was not before; nothing where not more is missed.
-    const auto newly_missed = [&] {
+    double most = limits.tolerance;
+    for (const TriangleError& error : *inspection.errors) most = std::max(most, error.largest);
+    // What is missed now but was not before, if more is missed, and where triangles are too far off.
+    const auto spoilt = [&] {
         for (const Blunting& change : blunter.changes())
             if (change.vertex < 0)
                 for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
         inspection = inspector->inspect_both_ways(mesh);
         std::vector<Vec3> places;
+        for (const TriangleError& error : *inspection.errors)
+            if (error.largest > most) places.push_back(error.where);
         if (inspection.missed.size() <= before.size()) return places;
         for (const auto& p : missed())
             if (!std::binary_search(before.begin(), before.end(), p)) places.emplace_back(p[0], p[1], p[2]);
@@ -66,7 +70,7 @@ void FrameWork::blunt() {
     bool again = true;
     for (int round = 0; again && round < kBluntRounds && blunter.run(kBluntPasses); ++round) {
         again = false;
-        for (auto places = newly_missed(); !places.empty(); places = newly_missed())
+        for (auto places = spoilt(); !places.empty(); places = spoilt())
             again = blunter.undo_near(places, limits.tolerance);
     }
 }

@@ -154,6 +154,25 @@ TEST(Blunter, KeepsTheTolerance) {
                   kPrecision * 0.5 * largest);
 }
 
+TEST(Blunter, KeepsTheToleranceAsItIsCertified) {
+    // Ripples with several maxima in a triangle, which the three intervals per edge that are looked at first
+    // do not come near to: certifying then looks again.
+    constexpr double kRipple = 0.012, kCertifiedTolerance = 0.016;
+    const auto rippled = shapes::from_function(
+        [](const Vec3& p) { return p.norm() - 1.0 - kRipple * (60.0 * p.array()).sin().prod(); },
+        Box(Vec3::Constant(-1.1), Vec3::Constant(1.1)), 0.1);
+    const CrossingGrid crossings(*rippled);
+    TriangleMesh mesh = rough_sphere();
+    Blunter blunter(mesh.points, mesh.triangles, all_of(mesh, true), *rippled, crossings,
+                    kCertifiedTolerance);
+    ASSERT_TRUE(blunter.run(kPasses));
+    EXPECT_GT(blunter.changes().size(), 50u);
+    const auto errors =
+        triangle_errors(mesh.points, mesh.triangles, *rippled, kStepsByLength, 0.6 * kCertifiedTolerance);
+    for (const Blunting& change : blunter.changes())
+        for (const int t : change.triangle) EXPECT_LE(errors[t].largest, kCertifiedTolerance);
+}
+
 TEST(Blunter, StaysAsNearToTheCrossings) {
     const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
     const TriangleMesh before = rough_sphere();
