@@ -81,6 +81,7 @@ void IncrementalDelaunay::insert(int vertex, int cell) {
     corner_of_.resize(points.size() + 1, kNone);
     freed_.assign(1, cell);
     rim_.clear();
+    // Locals, because a write to a char might be one to anything else; stale when there is a new slot.
     char* const marks = marks_.data();
     const auto* const links = cells_.links.data();
     marks[cell] = kConflict;

@@ -1,3 +1,4 @@
+#define CGAL_LINKED_WITH_TBB  // for what several threads sort
 #include "delaunay/spatial_order.h"
 
 #include <CGAL/hilbert_sort.h>
@@ -26,11 +27,11 @@ struct ByNumber {
 }  // namespace
 
 void sort_spatially(const std::vector<Vec3>& points, std::vector<int>& order) {
-    CGAL::spatial_sort<CGAL::Parallel_if_available_tag>(order.begin(), order.end(), ByNumber{points});
+    CGAL::spatial_sort<CGAL::Parallel_tag>(order.begin(), order.end(), ByNumber{points});
 }
 
 void sort_along_curve(const std::vector<Vec3>& points, std::vector<int>& order) {
-    CGAL::hilbert_sort<CGAL::Parallel_if_available_tag>(order.begin(), order.end(), ByNumber{points});
+    CGAL::hilbert_sort<CGAL::Parallel_tag>(order.begin(), order.end(), ByNumber{points});
 }
 
 }  // namespace isotrack

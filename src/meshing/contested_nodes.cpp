@@ -7,6 +7,10 @@
 #include <cmath>
 #include <numeric>
 #include <tuple>
+#include <utility>
+#include <vector>
+
+#include "isotrack/meshing/lattice_layers.h"
 
 namespace isotrack {
 namespace {
@@ -50,6 +54,7 @@ public:
             for (std::size_t t = range.begin(); t < range.end(); ++t) {
                 const auto [low, high] = std::minmax(
                     {points[triangles[t][0]].x(), points[triangles[t][1]].x(), points[triangles[t][2]].x()});
+                if (!(low <= high)) continue;
                 layers[t] = {static_cast<int>(std::ceil(low - kBeside[0])),
                              static_cast<int>(std::floor(high - kBeside[0])) + 1};
             }
@@ -141,8 +146,8 @@ Layer merge(const std::vector<Hit>& hits, const std::vector<std::atomic<char>>& 
     Layer layer;
     const Hit *h = hits.data(), *last_hit = h + hits.size();
     auto [u, last_upright] = uprights;
-    const auto skip = [&, end = last_hit](const Hit* hit) {
-        while (hit != end && !holds_node[hit->component].load(std::memory_order_relaxed)) ++hit;
+    const auto skip = [&](const Hit* hit) {
+        while (hit != last_hit && !holds_node[hit->component].load(std::memory_order_relaxed)) ++hit;
         return hit;
     };
     for (h = skip(h); h != last_hit || u != last_upright;) {

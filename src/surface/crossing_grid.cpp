@@ -9,18 +9,45 @@
 
 namespace isotrack {
 
+namespace {
+
+/// Of crossings: the box around them and their different directions.
+struct Extent {
+    Box box;
+    std::vector<Eigen::Vector3f> directions{};
+
+    void add(const Eigen::Vector3f& direction) {
+        if (std::find(directions.begin(), directions.end(), direction) == directions.end())
+            directions.push_back(direction);
+    }
+};
+
+}  // namespace
+
 CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing)
     : spacing_(spacing), width_(2.0 * spacing) {
     constexpr double kColumnsPerCrossing = 4.0;
     if (crossings.empty()) return;
     const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size(), 4096);
-    const Box box = tbb::parallel_reduce(
-        range_of_all, Box(),
-        [&](const auto& range, Box sum) {
-            for (std::size_t c = range.begin(); c < range.end(); ++c) sum.extend(crossings[c].point);
+    const Extent extent = tbb::parallel_reduce(
+        range_of_all, Extent(),
+        [&](const auto& range, Extent sum) {
+            for (std::size_t c = range.begin(); c < range.end(); ++c) {
+                sum.box.extend(crossings[c].point);
+                sum.add(crossings[c].outward);
+            }
             return sum;
         },
-        [](const Box& a, const Box& b) { return a.merged(b); });
+        [](Extent a, const Extent& b) {
+            a.box.extend(b.box);
+            for (const Eigen::Vector3f& direction : b.directions) a.add(direction);
+            return a;
+        });
+    const Box& box = extent.box;
+    directions_ = extent.directions;
+    std::sort(directions_.begin(), directions_.end(), [](const auto& a, const auto& b) {
+        return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+    });
     origin_ = box.min();
     const double most = kColumnsPerCrossing * static_cast<double>(crossings.size());
     const Vec3 size = box.sizes();
@@ -29,19 +56,14 @@ CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, doub
 
     const std::size_t columns = static_cast<std::size_t>(count_[0]) * count_[1];
     first_.assign(columns + 1, 0);
-    for (const auto& c : crossings)
-        if (std::find(directions_.begin(), directions_.end(), c.outward) == directions_.end())
-            directions_.push_back(c.outward);
-    const auto entry_of = [&](const Surface::Crossing& c) {
-        const auto known = std::find(directions_.begin(), directions_.end(), c.outward);
-        return Entry{(c.point - origin_).cast<float>(),
-                     static_cast<std::uint32_t>(known - directions_.begin())};
+    const auto offset_of = [&](const Surface::Crossing& c) -> Eigen::Vector3f {
+        return (c.point - origin_).cast<float>();
     };
     // Each goes to the next free place of its column, in any order: they are sorted then.
     std::vector<std::atomic<std::uint32_t>> next(columns);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c)
-            next[column_of(entry_of(crossings[c]))].fetch_add(1, std::memory_order_relaxed);
+            next[column_of(offset_of(crossings[c]))].fetch_add(1, std::memory_order_relaxed);
     });
     for (std::size_t c = 0; c < columns; ++c) {
         first_[c + 1] = first_[c] + next[c].load(std::memory_order_relaxed);
@@ -50,9 +72,11 @@ CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, doub
     entries_.resize(crossings.size());
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
-            const Entry entry = entry_of(crossings[c]);
-            const std::size_t column = column_of(entry);
-            entries_[first_[column] + next[column].fetch_add(1, std::memory_order_relaxed)] = entry;
+            const Eigen::Vector3f offset = offset_of(crossings[c]);
+            const std::size_t column = column_of(offset);
+            const auto direction = std::find(directions_.begin(), directions_.end(), crossings[c].outward);
+            entries_[first_[column] + next[column].fetch_add(1, std::memory_order_relaxed)] = {
+                offset, static_cast<std::uint32_t>(direction - directions_.begin())};
         }
     });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns, 256), [&](const auto& range) {
@@ -68,7 +92,7 @@ CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, doub
 
 std::vector<char> CrossingGrid::columns_of(const std::vector<int>& some) const {
     std::vector<char> result(first_.empty() ? 0 : first_.size() - 1, 0);
-    for (const int i : some) result[column_of(entries_[i])] = 1;
+    for (const int i : some) result[column_of(entries_[i].offset)] = 1;
     return result;
 }
 

@@ -51,17 +51,22 @@ void FrameWork::blunt() {
         return places;
     };
     const auto before = missed();
-    double most = limits.tolerance;
-    for (const TriangleError& error : *inspection.errors) most = std::max(most, error.largest);
-    // What is missed now but was not before, if more is missed, and where triangles are too far off.
+    const auto errors_before = inspection.errors;
+    // Where changed triangles are beyond the tolerance and farther off than those they stand for, and, if
+    // more is missed, what was not before.
     const auto spoilt = [&] {
         for (const Blunting& change : blunter.changes())
             if (change.vertex < 0)
                 for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
         inspection = inspector->inspect_both_ways(mesh);
         std::vector<Vec3> places;
-        for (const TriangleError& error : *inspection.errors)
-            if (error.largest > most) places.push_back(error.where);
+        for (const Blunting& change : blunter.changes()) {
+            double limit = limits.tolerance;
+            for (const int t : change.triangle) limit = std::max(limit, (*errors_before)[t].largest);
+            for (const int t : change.triangle)
+                if (const TriangleError& error = (*inspection.errors)[t]; error.largest > limit)
+                    places.push_back(error.where);
+        }
         if (inspection.missed.size() <= before.size()) return places;
         for (const auto& p : missed())
             if (!std::binary_search(before.begin(), before.end(), p)) places.emplace_back(p[0], p[1], p[2]);
@@ -70,8 +75,9 @@ void FrameWork::blunt() {
     bool again = true;
     for (int round = 0; again && round < kBluntRounds && blunter.run(kBluntPasses); ++round) {
         again = false;
-        for (auto places = spoilt(); !places.empty(); places = spoilt())
-            again = blunter.undo_near(places, limits.tolerance);
+        for (auto places = spoilt(); !places.empty() && blunter.undo_near(places, limits.tolerance);
+             places = spoilt())
+            again = true;
     }
 }
 

@@ -21,8 +21,8 @@ struct FrameWork {
     std::optional<Inspector> inspector;  ///< Of this mesh.
     Inspection inspection;
 
-    /// Makes the triangles better as far as the mesh goes on reaching all it reached, and hands the frame
-    /// over. Needs nothing of the tracker, which may be at the next frames.
+    /// Makes the triangles better as far as the mesh goes on reaching all it reached and none gets beyond the
+    /// tolerance, and hands the frame over. Needs nothing of the tracker, which may be at the next frames.
     TrackedFrame finish(const TrackerOptions& options);
 
 private:

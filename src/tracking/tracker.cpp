@@ -132,7 +132,7 @@ struct Tracker::Impl {
     }
 
     /// Brings the DT to the particles. `moved`: what was known of its cells does not hold any more.
-    /// `meanwhile` runs beside it, which keeps one thread alone busy, and may read the particles.
+    /// `meanwhile` runs beside it, which keeps little more than one thread busy, and may read the particles.
     void tetrahedralise(bool moved, std::map<std::string, double>& seconds,
                         const std::function<void()>& meanwhile = {}) {
         round_to_float(particles);
@@ -356,7 +356,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     const std::size_t crossing_count = work->crossings->size();
     // As long as many particles have to be added their surroundings make room for them.
     std::size_t added = 0;
-    std::optional<Densifier> densifier;
+    std::optional<Densifier> densifier;  // none in the paper's method, which mends nothing
     inspector.emplace(surface, l, *work->crossings);
     for (int mending = 0;; ++mending) {
         inspector->restart();

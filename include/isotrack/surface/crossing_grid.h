@@ -74,8 +74,8 @@ private:
     int column(int axis, double offset) const {
         return static_cast<int>(std::clamp(offset / width_, 0.0, static_cast<double>(count_[axis] - 1)));
     }
-    std::size_t column_of(const Entry& e) const {
-        return static_cast<std::size_t>(column(0, e.offset.x())) * count_[1] + column(1, e.offset.y());
+    std::size_t column_of(const Eigen::Vector3f& offset) const {
+        return static_cast<std::size_t>(column(0, offset.x())) * count_[1] + column(1, offset.y());
     }
 
     std::vector<Entry> entries_;
