@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "isotrack/meshing/lattice_layers.h"
+#include "meshing/lattice_lines.h"
 
 namespace isotrack {
 namespace {
@@ -142,7 +142,7 @@ struct Layer {
 };
 
 Layer merge(const std::vector<Hit>& hits, const std::vector<std::atomic<char>>& holds_node,
-            const LatticeSides::Uprights::Range& uprights) {
+            const Uprights::Range& uprights) {
     Layer layer;
     const Hit *h = hits.data(), *last_hit = h + hits.size();
     auto [u, last_upright] = uprights;
@@ -186,7 +186,7 @@ bool is_contested(const Layer& layer, const Layer::Line& line, std::size_t pair,
 Contested contested_nodes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                           const std::vector<int>& component, int components, const LatticeSides& sides) {
     const TrianglesByLayer over(points, triangles);
-    const LatticeSides::Uprights& uprights = sides.uprights();
+    const Uprights& uprights = sides.uprights();
     if (over.empty() && uprights.empty()) return {{}, std::vector<char>(components, 0)};
     const int low_x = over.empty()       ? uprights.low_x()
                       : uprights.empty() ? over.low_x()

@@ -167,7 +167,7 @@ std::vector<Around> look_around(const std::vector<Node>& wrong, const LatticeSid
         Surface::Probe& own_probe = probes.local();
         // The lines around a node, and the first of the wrong nodes that are not below: both only go up.
         struct Line {
-            LatticeSides::Uprights::Range crossed;
+            Uprights::Range crossed;
             bool known;  // it comes out where it went in
             std::vector<Node>::const_iterator at;
         };
@@ -180,7 +180,7 @@ std::vector<Around> look_around(const std::vector<Node>& wrong, const LatticeSid
                     const Node low = {wrong[w][0] + x, wrong[w][1] + y, wrong[w][2] - 1};
                     Line& line = lines[x + 1][y + 1];
                     if (!same_line) {
-                        line.crossed = sides.line(low[0], low[1]);
+                        line.crossed = sides.uprights().line(low[0], low[1]);
                         line.known = (line.crossed.second - line.crossed.first) % 2 == 0;
                         line.at = from(w > range.begin() ? line.at : wrong.cbegin(), low);
                     }
@@ -189,9 +189,8 @@ std::vector<Around> look_around(const std::vector<Node>& wrong, const LatticeSid
                     for (int z = -1; z <= 1; ++z) {
                         const Node m = {low[0], low[1], wrong[w][2] + z};
                         const bool is_wrong = at != wrong.end() && !(m < *at);
-                        const auto below =
-                            std::count_if(line.crossed.first, line.crossed.second,
-                                          [&](const LatticeSides::Upright& u) { return u.z < m[2]; });
+                        const auto below = std::count_if(line.crossed.first, line.crossed.second,
+                                                         [&](const Uprights::Node& u) { return u.z < m[2]; });
                         const bool inside = line.known
                                                 ? below % 2 == 1
                                                 : own_probe.value(lattice * Vec3(m[0], m[1], m[2])) < 0.0;

@@ -543,7 +543,10 @@ std::vector<Found> gather(const std::vector<CrossedEdge>& edges, const MakeAdd& 
     for (const auto& block : blocks) count += block.size();
     std::vector<Found> result;
     result.reserve(count);
-    for (const auto& block : blocks) result.insert(result.end(), block.begin(), block.end());
+    for (auto& block : blocks) {
+        result.insert(result.end(), block.begin(), block.end());
+        std::vector<Found>().swap(block);
+    }
     return result;
 }
 

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <utility>
 #include <vector>
 
-#include "isotrack/meshing/lattice_layers.h"
 #include "isotrack/surface/surface.h"
 #include "isotrack/types.h"
 
@@ -24,6 +24,37 @@ struct LatticeTopology {
     std::vector<char> speck;
 };
 
+/// The crossed edges along the lattice's third axis, each from its lower node (x, y, z): in layers of one x,
+/// ascending there in y and z.
+class Uprights {
+public:
+    struct Node {
+        int y, z;
+    };
+    using Range = std::pair<const Node*, const Node*>;
+
+    Uprights() = default;
+    /// From lower nodes in any order.
+    explicit Uprights(const std::vector<Eigen::Vector3i>& nodes);
+
+    /// The layers from `low_x()` up to, but not including, `end_x()` may hold some.
+    int low_x() const { return low_x_; }
+    int end_x() const { return low_x_ + static_cast<int>(first_.size()) - 1; }
+    bool empty() const { return nodes_.empty(); }
+    Range layer(int x) const {
+        if (x < low_x() || x >= end_x()) return {nullptr, nullptr};
+        const auto at = static_cast<std::size_t>(x - low_x_);
+        return {nodes_.data() + first_[at], nodes_.data() + first_[at + 1]};
+    }
+    /// Those of one line.
+    Range line(int x, int y) const;
+
+private:
+    int low_x_ = 0;
+    std::vector<Node> nodes_;
+    std::vector<std::size_t> first_ = {0};  // of each layer, and the end
+};
+
 /// The sides of the lattice nodes of a surface, to hold meshes of it against. Read-only, so threads may share
 /// it.
 class LatticeSides {
@@ -34,15 +65,7 @@ public:
     const Surface& surface() const { return surface_; }
     /// The surface's, ascending in the least x of their nodes.
     const std::vector<Surface::Diagonal>& diagonals() const { return diagonals_; }
-    /// The crossed edges along the lattice's third axis, each from its lower node (x, y, z); ascending in x,
-    /// y and z.
-    struct Upright {
-        int x, y, z;
-    };
-    using Uprights = LatticeLayers<Upright>;
     const Uprights& uprights() const { return uprights_; }
-    /// Those of one line.
-    Uprights::Range line(int x, int y) const;
 
 private:
     const Surface& surface_;
