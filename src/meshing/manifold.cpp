@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "find_in_blocks.h"
 #include "meshing/corners.h"
 
 namespace isotrack {
@@ -17,21 +18,15 @@ class Boundary {
 public:
     Boundary(const Tetrahedra& cells, const CellLabels& labels) : cells_(cells), labels_(labels) {
         constexpr std::size_t kBlock = 8192;
-        std::vector<std::vector<Facet>> blocks((cells.size() + kBlock - 1) / kBlock);
-        tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
-            for (std::size_t c = block * kBlock; c < std::min(cells.size(), (block + 1) * kBlock); ++c) {
-                if (!labels[c]) continue;
-                for (int k = 0; k < 4; ++k)
-                    if (!labels[cells.neighbour(c, k)]) blocks[block].push_back({static_cast<int>(c), k});
-            }
-        });
-        std::vector<std::size_t> first{0};
-        for (const auto& block : blocks) first.push_back(first.back() + block.size());
-        facets_.resize(first.back());
-        tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
-            std::copy(blocks[block].begin(), blocks[block].end(),
-                      facets_.begin() + static_cast<std::ptrdiff_t>(first[block]));
-        });
+        facets_ = find_in_blocks<Facet>(cells.size(), kBlock,
+                                        [&](std::size_t begin, std::size_t end, std::vector<Facet>& found) {
+                                            for (std::size_t c = begin; c < end; ++c) {
+                                                if (!labels[c]) continue;
+                                                for (int k = 0; k < 4; ++k)
+                                                    if (!labels[cells.neighbour(c, k)])
+                                                        found.push_back({static_cast<int>(c), k});
+                                            }
+                                        });
     }
     struct Facet {
         int cell, k;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "find_in_blocks.h"
 #include "sampling/compact.h"
 
 namespace isotrack {
@@ -104,41 +105,31 @@ Adjacency Adjacency::extended(const std::vector<std::array<int, 3>>& newborn, st
 
 Adjacency Adjacency::squared() const {
     constexpr std::size_t kBlock = 1024;
-    struct Block {
-        std::vector<int> count, adjacent;
-    };
-    std::vector<Block> blocks((size() + kBlock - 1) / kBlock);
+    Adjacency result;
+    result.first.resize(size() + 1);
     // Per thread: the particle whose list somebody was put on last.
     tbb::enumerable_thread_specific<std::vector<int>> listed_by([&] { return std::vector<int>(size(), -1); });
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
-        Block& block = blocks[b];
+    const auto find = [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
         std::vector<int>& listed = listed_by.local();
-        for (std::size_t i = b * kBlock; i < std::min(size(), (b + 1) * kBlock); ++i) {
-            const auto start = static_cast<std::ptrdiff_t>(block.adjacent.size());
+        for (std::size_t i = begin; i < end; ++i) {
+            const std::size_t start = found.size();
             const int self = static_cast<int>(i);
             listed[i] = self;
             const auto list = [&](int j) {
                 if (listed[j] == self) return;
                 listed[j] = self;
-                block.adjacent.push_back(j);
+                found.push_back(j);
             };
             for (const int j : of(i)) {
                 list(j);
                 for (const int k : of(j)) list(k);
             }
-            std::sort(block.adjacent.begin() + start, block.adjacent.end());
-            block.count.push_back(static_cast<int>(block.adjacent.end() - block.adjacent.begin() - start));
+            std::sort(found.begin() + static_cast<std::ptrdiff_t>(start), found.end());
+            result.first[i + 1] = static_cast<int>(found.size() - start);
         }
-    });
-    Adjacency result;
-    result.first.reserve(first.size());
-    for (const Block& block : blocks)
-        for (const int count : block.count) result.first.push_back(result.first.back() + count);
-    result.adjacent.resize(result.first.back());
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
-        std::copy(blocks[b].adjacent.begin(), blocks[b].adjacent.end(),
-                  result.adjacent.begin() + result.first[b * kBlock]);
-    });
+    };
+    result.adjacent = find_in_blocks<int>(size(), kBlock, find);
+    for (std::size_t i = 0; i < size(); ++i) result.first[i + 1] += result.first[i];
     return result;
 }
 

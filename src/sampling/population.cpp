@@ -1,13 +1,12 @@
 #include "isotrack/sampling/population.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <utility>
 
+#include "find_in_blocks.h"
 #include "sampling/metric.h"
 #include "surface/float_precision.h"
 
@@ -23,14 +22,12 @@ namespace {
 template <typename Measure>
 std::vector<std::pair<double, int>> smallest_first(std::size_t count, const Measure& measure, double limit) {
     constexpr std::size_t kBlock = 4096;
-    std::vector<std::vector<std::pair<double, int>>> blocks((count + kBlock - 1) / kBlock);
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
-        for (std::size_t i = b * kBlock; i < std::min(count, (b + 1) * kBlock); ++i)
-            if (const double value = measure(i); value < limit)
-                blocks[b].emplace_back(value, static_cast<int>(i));
-    });
-    std::vector<std::pair<double, int>> result;
-    for (const auto& block : blocks) result.insert(result.end(), block.begin(), block.end());
+    auto result = find_in_blocks<std::pair<double, int>>(
+        count, kBlock, [&](std::size_t begin, std::size_t end, std::vector<std::pair<double, int>>& found) {
+            for (std::size_t i = begin; i < end; ++i)
+                if (const double value = measure(i); value < limit)
+                    found.emplace_back(value, static_cast<int>(i));
+        });
     std::sort(result.begin(), result.end());
     return result;
 }

@@ -1,9 +1,10 @@
 #include "surface/crossed_edges.h"
 
 #include <openvdb/tree/LeafManager.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
+
+#include "find_in_blocks.h"
 
 namespace isotrack {
 namespace {
@@ -99,39 +100,25 @@ void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
     }
 }
 
-/// Where the parts begin in all of them together, and the end.
-template <typename Part>
-std::vector<std::size_t> begins(const std::vector<Part>& parts) {
-    std::vector<std::size_t> result{0};
-    for (const auto& part : parts) result.push_back(result.back() + part.size());
-    return result;
-}
-
 }  // namespace
 
 CrossedEdges find_crossed_edges(const FloatTree& tree) {
     const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
     const std::size_t count = leaves.leafCount();
-    std::vector<std::vector<CrossedEdge>> blocks((count + kLeavesPerBlock - 1) / kLeavesPerBlock);
-    std::vector<std::size_t> ends(count);  // of each leaf, within its block
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
-        Accessor accessor(tree);
-        const std::size_t end = std::min(count, (block + 1) * kLeavesPerBlock);
-        for (std::size_t n = block * kLeavesPerBlock; n < end; ++n) {
-            add_edges_of(leaves.leaf(n), tree, accessor, blocks[block]);
-            ends[n] = blocks[block].size();
-        }
-    });
-    const std::vector<std::size_t> begin = begins(blocks);
+    std::vector<std::size_t> edges_of(count);  // how many, of each leaf
     CrossedEdges result;
-    result.edges.resize(begin.back());
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
-        std::copy(blocks[block].begin(), blocks[block].end(),
-                  result.edges.begin() + static_cast<std::ptrdiff_t>(begin[block]));
-    });
+    result.edges = find_in_blocks<CrossedEdge>(
+        count, kLeavesPerBlock, [&](std::size_t begin, std::size_t end, std::vector<CrossedEdge>& found) {
+            Accessor accessor(tree);
+            for (std::size_t n = begin; n < end; ++n) {
+                const std::size_t before = found.size();
+                add_edges_of(leaves.leaf(n), tree, accessor, found);
+                edges_of[n] = found.size() - before;
+            }
+        });
     std::size_t last = 0;
     for (std::size_t n = 0; n < count; ++n) {
-        const std::size_t end = begin[n / kLeavesPerBlock] + ends[n];
+        const std::size_t end = last + edges_of[n];
         if (end > last) result.parts.push_back({leaves.leaf(n).origin(), last, end});
         last = end;
     }
@@ -140,17 +127,14 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
 
 std::vector<std::size_t> thin_out(const CrossedEdges& crossed, int cube) {
     constexpr std::size_t kNone = ~std::size_t{0};
-    const std::size_t count = crossed.parts.size();
-    std::vector<std::vector<std::size_t>> blocks((count + kLeavesPerBlock - 1) / kLeavesPerBlock);
     const int across = kDim / cube;
     struct Cube {
         int count[3];         // of edges along each axis
         std::size_t some[6];  // the last of each direction
     };
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
+    const auto find = [&](std::size_t begin, std::size_t end, std::vector<std::size_t>& found) {
         std::vector<Cube> cubes(static_cast<std::size_t>(across * across * across));
-        const std::size_t end = std::min(count, (block + 1) * kLeavesPerBlock);
-        for (std::size_t n = block * kLeavesPerBlock; n < end; ++n) {
+        for (std::size_t n = begin; n < end; ++n) {
             const CrossedEdges::Part& part = crossed.parts[n];
             for (Cube& c : cubes) {
                 std::fill_n(c.count, 3, 0);
@@ -168,14 +152,11 @@ std::vector<std::size_t> thin_out(const CrossedEdges& crossed, int cube) {
             for (const Cube& c : cubes) {
                 const auto axis = std::max_element(c.count, c.count + 3) - c.count;
                 for (const std::size_t e : {c.some[2 * axis], c.some[2 * axis + 1]})
-                    if (e != kNone) blocks[block].push_back(e);
+                    if (e != kNone) found.push_back(e);
             }
         }
-    });
-    std::vector<std::size_t> result;
-    result.reserve(begins(blocks).back());
-    for (const auto& block : blocks) result.insert(result.end(), block.begin(), block.end());
-    return result;
+    };
+    return find_in_blocks<std::size_t>(crossed.parts.size(), kLeavesPerBlock, find);
 }
 
 }  // namespace isotrack

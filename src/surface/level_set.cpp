@@ -13,6 +13,7 @@
 #include <cstring>
 #include <limits>
 
+#include "find_in_blocks.h"
 #include "isotrack/error.h"
 #include "surface/ambiguous_faces.h"
 #include "surface/crossed_edges.h"
@@ -533,21 +534,11 @@ namespace {
 template <typename Found, typename MakeAdd>
 std::vector<Found> gather(const std::vector<CrossedEdge>& edges, const MakeAdd& make_add) {
     constexpr std::size_t kBlock = 16384;
-    std::vector<std::vector<Found>> blocks((edges.size() + kBlock - 1) / kBlock);
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
-        auto add = make_add();
-        for (std::size_t e = block * kBlock; e < std::min(edges.size(), (block + 1) * kBlock); ++e)
-            add(edges[e], blocks[block]);
-    });
-    std::size_t count = 0;
-    for (const auto& block : blocks) count += block.size();
-    std::vector<Found> result;
-    result.reserve(count);
-    for (auto& block : blocks) {
-        result.insert(result.end(), block.begin(), block.end());
-        std::vector<Found>().swap(block);
-    }
-    return result;
+    return find_in_blocks<Found>(edges.size(), kBlock,
+                                 [&](std::size_t begin, std::size_t end, std::vector<Found>& found) {
+                                     auto add = make_add();
+                                     for (std::size_t e = begin; e < end; ++e) add(edges[e], found);
+                                 });
 }
 
 }  // namespace
