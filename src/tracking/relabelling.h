@@ -16,4 +16,12 @@ std::size_t relabel(CellLabels& labels, const Tetrahedra& cells, const FrameMesh
                     const Inspection& inspection, const Particles& particles, const Surface& surface,
                     const SizingLimits& limits);
 
+/// For what is missed although a particle that no triangle has is there, such as the tip of a sheet that
+/// labels cut off or a dent that they fill: the cell between it and a triangle of the mesh changes sides
+/// where the three triangles to it that come instead are within the tolerance. That joins nothing and parts
+/// nothing. Returns how many cells changed.
+std::size_t reach_out(CellLabels& labels, const Tetrahedra& cells, const FrameMesh& mesh,
+                      const Inspection& inspection, const Particles& particles, const Surface& surface,
+                      const SizingLimits& limits);
+
 }  // namespace isotrack

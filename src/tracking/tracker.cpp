@@ -404,6 +404,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
             if (options.reconstruction != Reconstruction::Guided || relabellings == kMostRelabellings)
                 return true;
             ++relabellings;
+            if (reach_out(labels, dt->cells(), mesh, inspection, particles, surface, l) > 0) return false;
             return relabel(labels, dt->cells(), mesh, inspection, particles, surface, l) == 0;
         };
         inspection = inspector->inspect_both_ways(mesh);
