@@ -9,8 +9,9 @@
 
 namespace isotrack {
 
-/// `find(begin, end, list)` appends what it finds at the numbers from `begin` to `end` to the list of their
-/// block; the lists of all numbers below `count`, joined in their order. Uses TBB inside.
+/// `find(begin, end, list)`, called by several threads at once, appends what it finds at the numbers from
+/// `begin` to before `end` to the list of their block, of `block_size` > 0. Returns the lists of all numbers
+/// below `count`, joined in their order.
 template <typename Found, typename Find>
 std::vector<Found> find_in_blocks(std::size_t count, std::size_t block_size, const Find& find) {
     std::vector<std::vector<Found>> blocks((count + block_size - 1) / block_size);

@@ -12,7 +12,7 @@ namespace isotrack {
 namespace {
 
 constexpr double kFacing = 0.5;  // cosine to the surface normal, at least
-constexpr double kOwn = 1.03;    // of the tolerance: crossings that near are of a triangle
+constexpr double kOwn = 1.03;    // of the tolerance: what is that near is of a triangle
 
 Box box_of(const std::vector<Vec3>& points, const Triangle& t) {
     Box box(points[t[0]]);
@@ -97,16 +97,14 @@ Replaced BluntedMesh::replaced(std::vector<int> numbers) const {
     return result;
 }
 
-/// Crossings farther from the old triangles than the tolerance are the concern of others.
+/// What is farther from the old triangles than the tolerance is the concern of others.
 bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>& candidates) {
     std::vector<FacingTriangle> after;
     for (const Triangle& t : candidates) after.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
     const double own2 = kOwn * tolerance * kOwn * tolerance, tolerance2 = tolerance * tolerance;
     const Vec3 reach = Vec3::Constant(kOwn * tolerance);
     bool all = true;
-    crossings.for_each_in(Box(before.box.min() - reach, before.box.max() + reach), [&](std::size_t c) {
-        if (!all) return;
-        const Surface::Crossing crossing = crossings[c];
+    const auto check = [&](const Surface::Crossing& crossing) {
         double least = own2;
         bool own = false;
         for (const FacingTriangle& t : before.triangles) {
@@ -122,7 +120,12 @@ bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>
         };
         all = std::any_of(after.begin(), after.end(), reaches) ||
               std::any_of(before.beside.begin(), before.beside.end(), reaches);
-    });
+    };
+    for (const CrossingGrid* points_there : reached)
+        points_there->for_each_in(Box(before.box.min() - reach, before.box.max() + reach),
+                                  [&](std::size_t c) {
+                                      if (all) check((*points_there)[c]);
+                                  });
     return all;
 }
 
@@ -144,13 +147,13 @@ std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& 
 }
 
 Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
-                 const Surface& surface, const CrossingGrid& crossings, double tolerance)
+                 const Surface& surface, const std::vector<const CrossingGrid*>& reached, double tolerance)
     : points_(points),
       triangles_(triangles),
       movable_(std::move(movable)),
       fixed_(points.size(), 0),
       surface_(surface),
-      crossings_(crossings),
+      reached_(reached),
       tolerance_(tolerance),
       open_(points.size(), 1),
       unchecked_(triangles.size(), 0) {}
@@ -188,7 +191,7 @@ bool Blunter::pass() {
                      tolerance_,
                      surface_.resolution(),
                      *probe,
-                     crossings_,
+                     reached_,
                      lost_,
                      std::vector<char>(points_.size(), 0),
                      std::nullopt};

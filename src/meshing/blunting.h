@@ -33,7 +33,7 @@ struct BluntedMesh {
     double tolerance;
     double resolution;  ///< Of the surface.
     Surface::Probe& probe;
-    const CrossingGrid& crossings;
+    const std::vector<const CrossingGrid*>& reached;
     std::set<std::pair<int, int>>&
         lost;                   ///< Edges, ascending, that may come back and are not to be made anew.
     std::vector<char> touched;  ///< Per vertex: a change is near.
@@ -42,7 +42,7 @@ struct BluntedMesh {
     double sharpness_of(const Triangle& t) const;
     Replaced replaced(std::vector<int> numbers) const;
     /// Whether all these triangles face the way the surface does, or no worse than those they stand for, are
-    /// within the tolerance of it, and with those beside them keep what those stand for of the crossings
+    /// within the tolerance of it, and with those beside them keep what those stand for of what is reached
     /// within the tolerance.
     bool may_have(const std::vector<Triangle>& candidates, const Replaced& before);
     /// The triangles but `except` (ascending) whose boxes meet this one.

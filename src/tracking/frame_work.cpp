@@ -1,7 +1,6 @@
 #include "tracking/frame_work.h"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "isotrack/meshing/blunting.h"
@@ -42,23 +41,28 @@ void FrameWork::refit() {
 /// Makes sharp triangles blunter. The particles stay where they are: the next frame's triangles are others.
 void FrameWork::blunt() {
     const StageTimer timer(frame.seconds, "blunt");
-    Blunter blunter(mesh.vertices, mesh.carved.triangles, movable(), surface, *crossings,
-                    kChangedShare * limits.tolerance);
-    const auto missed = [&] {
-        std::vector<std::array<double, 3>> places;
-        for (const auto& c : inspection.missed) places.push_back({c.point.x(), c.point.y(), c.point.z()});
-        std::sort(places.begin(), places.end());
-        return places;
+    std::vector<const CrossingGrid*> reached;
+    const auto take_what_is_looked_at = [&] {
+        reached.assign(1, &*crossings);
+        for (const CrossingGrid& between : inspector->between()) reached.push_back(&between);
     };
-    const auto before = missed();
+    take_what_is_looked_at();
     const auto errors_before = inspection.errors;
-    // Where changed triangles are beyond the tolerance and farther off than those they stand for, and, if
-    // more is missed, what was not before.
-    const auto spoilt = [&] {
+    const std::vector<Vec3> vertices_before = mesh.vertices;
+    const std::vector<Triangle> triangles_before = mesh.carved.triangles;
+    Blunter blunter(mesh.vertices, mesh.carved.triangles, movable(), surface, reached,
+                    kChangedShare * limits.tolerance);
+    // Where changed triangles are beyond the tolerance and farther off than those they stand for, and what is
+    // missed that was not before.
+    const auto spoilt = [&](bool look_between) {
         for (const Blunting& change : blunter.changes())
             if (change.vertex < 0)
                 for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
         inspection = inspector->inspect_both_ways(mesh);
+        if (look_between) {
+            inspector->look_between(mesh, inspection);
+            take_what_is_looked_at();
+        }
         std::vector<Vec3> places;
         for (const Blunting& change : blunter.changes()) {
             double limit = limits.tolerance;
@@ -67,23 +71,25 @@ void FrameWork::blunt() {
                 if (const TriangleError& error = (*inspection.errors)[t]; error.largest > limit)
                     places.push_back(error.where);
         }
-        if (inspection.missed.size() <= before.size()) return places;
-        for (const auto& p : missed())
-            if (!std::binary_search(before.begin(), before.end(), p)) places.emplace_back(p[0], p[1], p[2]);
+        for (const auto& c : inspector->newly_missed(inspection, vertices_before, triangles_before))
+            places.push_back(c.point);
         return places;
     };
     bool again = true;
     for (int round = 0; again && round < kBluntRounds && blunter.run(kBluntPasses); ++round) {
         again = false;
-        for (auto places = spoilt(); !places.empty() && blunter.undo_near(places, limits.tolerance);
-             places = spoilt())
+        for (auto places = spoilt(true); !places.empty() && blunter.undo_near(places, limits.tolerance);
+             places = spoilt(false))
             again = true;
     }
 }
 
 TrackedFrame FrameWork::finish(const TrackerOptions& options) {
-    if (options.method != Method::Paper) blunt();
-    if (options.method != Method::Paper && options.fit) refit();
+    if (options.method != Method::Paper) {
+        blunt();
+        if (options.fit) refit();
+        inspector->look_between(mesh, inspection);
+    }
     report(mesh, inspection, limits, frame);
     frame.mesh.points = std::move(mesh.vertices);
     frame.mesh.triangles = std::move(mesh.carved.triangles);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "sampling/compact.h"
 #include "surface/lattice_scan.h"
@@ -77,12 +78,24 @@ std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector
     return result;
 }
 
+Inspector::Inspector(const Surface& surface, const SizingLimits& limits, const CrossingGrid& crossings)
+    : surface_(surface),
+      limits_(limits),
+      crossings_(crossings),
+      between_crossings_(crossings, surface.lattice(), limits.tolerance) {
+    distances_.emplace_back(crossings_, cutoff());
+    missed_.emplace_back();
+}
+
+double Inspector::cutoff() const {
+    return kLostAt * limits_.tolerance;
+}
+
 void Inspector::restart() {
     expected_.reset();
     facets_.clear();
     errors_.reset();
-    distances_.clear();
-    missed_.clear();
+    forget_distances();
     looks_ = 0;
 }
 
@@ -96,8 +109,7 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     std::vector<Facet> facets = facets_of(mesh.carved, mesh.vertices);
     std::vector<const TriangleError*> known(facets.size(), nullptr);
     std::vector<char> seen(facets.size(), 0);  // in the mesh before
-    came_.clear();
-    went_.clear();
+    changes_ = {};
     compare(
         facets, facets_,
         [&](std::size_t f, std::size_t old) {
@@ -105,14 +117,16 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
             seen[f] = 1;
         },
         [&](std::size_t f) {
-            if (!distances_.empty()) came_.push_back(facets[f]);
+            if (measured_) changes_.came.push_back(facets[f]);
             const auto [corner, whole] = corners_of(mesh.carved, f);
             const int e = expected_ && whole ? expected_->triangles.find(corner) : -1;
             if (e >= 0) known[f] = &expected_->errors[e];
         },
         [&](std::size_t old) {
-            if (!distances_.empty()) went_.push_back(facets_[old]);
+            if (measured_) changes_.went.push_back(facets_[old]);
         });
+    changes_.many = static_cast<double>(std::max(changes_.came.size(), changes_.went.size())) >
+                    kMany * static_cast<double>(facets.size());
     std::vector<Triangle> fresh;
     for (std::size_t f = 0; f < facets.size(); ++f)
         if (!known[f]) fresh.push_back(from_least_corner(mesh.carved.triangles[f]));
@@ -140,100 +154,73 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     return in_vain;
 }
 
-std::vector<Vec3> Inspector::measure_distances(const FrameMesh& mesh, Inspection& result) {
-    const double cutoff = kLostAt * limits_.tolerance;
-    const std::vector<int> missed_before = std::move(missed_);  // ascending
-    missed_.clear();
-    const auto changed = static_cast<double>(std::max(came_.size(), went_.size()));
-    if (distances_.empty() || changed > kMany * static_cast<double>(facets_.size())) {
-        distances_ = crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, cutoff);
-    } else {
-        // What was nearest to a triangle that went is to be measured again; what is nearer to one that came
-        // than to all before is measured now.
-        const double same = 1e-6 * cutoff;  // rounding
-        constexpr double kUnknown = -1.0;
-        const auto for_each_near = [&](const Facet& facet, const auto& body) {
-            const auto& [a, b, c] = facet.corner;
-            const Vec3 reach = Vec3::Constant(reach_ + same), low = a.cwiseMin(b).cwiseMin(c).cast<double>(),
-                       high = a.cwiseMax(b).cwiseMax(c).cast<double>();
-            const FacingTriangle triangle(a.cast<double>(), b.cast<double>(), c.cast<double>());
-            crossings_.for_each_in(Box(low - reach, high + reach), [&](std::size_t i) {
-                if (distances_[i] != kUnknown) body(triangle, i);
-            });
-        };
-        std::vector<int> unknown;
-        for (const Facet& facet : went_)
-            for_each_near(facet, [&](const FacingTriangle& triangle, std::size_t i) {
-                const double d = distances_[i] + same;
-                if (triangle.squared_distance(crossings_[i], d * d) > d * d) return;
-                distances_[i] = kUnknown;
-                unknown.push_back(static_cast<int>(i));
-            });
-        for (const Facet& facet : came_)
-            for_each_near(facet, [&](const FacingTriangle& triangle, std::size_t i) {
-                const double limit = std::min(distances_[i], cutoff),
-                             d2 = triangle.squared_distance(crossings_[i], limit * limit);
-                if (d2 < limit * limit) distances_[i] = std::sqrt(d2);
-            });
-        crossing_distances(mesh.vertices, mesh.carved.triangles, crossings_, unknown, cutoff, distances_);
-    }
-
-    struct Block {
-        std::vector<int> missed;
-        std::size_t lost = 0;
-        double farthest = 0.0, sum = 0.0;
-    };
-    constexpr std::size_t kBlock = 32768;
-    std::vector<Block> blocks((crossings_.size() + kBlock - 1) / kBlock);
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
-        Block& block = blocks[b];
-        for (std::size_t c = b * kBlock; c < std::min(crossings_.size(), (b + 1) * kBlock); ++c) {
-            if (is_missed(distances_[c])) block.missed.push_back(static_cast<int>(c));
-            if (!std::isfinite(distances_[c])) {
-                ++block.lost;
-                continue;
-            }
-            block.farthest = std::max(block.farthest, distances_[c]);
-            block.sum += distances_[c] * distances_[c];
-        }
-    });
-    double sum = 0.0;
-    for (const Block& block : blocks) {
-        missed_.insert(missed_.end(), block.missed.begin(), block.missed.end());
-        result.lost_crossings += block.lost;
-        result.farthest_crossing = std::max(result.farthest_crossing, block.farthest);
-        sum += block.sum;
-    }
-    reach_ = result.lost_crossings > 0 ? cutoff : result.farthest_crossing;
-    const std::size_t found = crossings_.size() - result.lost_crossings;
-    if (found > 0) result.crossings_mean_square = sum / static_cast<double>(found);
+void Inspector::take_missed(std::size_t d, Inspection& result) {
+    const auto survey = distances_[d].survey(kCertified * limits_.tolerance);
+    result.lost_crossings += survey.lost;
+    result.farthest_crossing = std::max(result.farthest_crossing, survey.farthest);
+    const std::vector<int> before = std::exchange(missed_[d], survey.beyond);
     std::vector<Vec3> in_vain;
-    for (const int c : missed_) {
-        result.missed.push_back(crossings_[c]);
-        if (std::binary_search(missed_before.begin(), missed_before.end(), c))
-            in_vain.push_back(crossings_[c].point);
+    for (const int i : survey.beyond) {
+        const Surface::Crossing place = distances_[d].points()[i];
+        result.missed.push_back(place);
+        if (std::binary_search(before.begin(), before.end(), i)) in_vain.push_back(place.point);
     }
-    return in_vain;
+    doubt(in_vain, kVainSpacing, result);
+    if (d > 0) {  // they are not among the crossings around them
+        for (const Vec3& place : in_vain)
+            result.doubtful.push_back(
+                {place, kVainSpacing * surface_.resolution(), kLeastDoubtful * surface_.resolution()});
+    } else if (const std::size_t found = crossings_.size() - survey.lost; found > 0) {
+        result.crossings_mean_square = survey.sum_of_squares / static_cast<double>(found);
+    }
 }
 
 Inspection Inspector::inspect(const FrameMesh& mesh) {
     Inspection result;
-    distances_.clear();
+    forget_distances();
     doubt(measure_errors(mesh, result), kVainSpacing, result);
     return result;
 }
 
 Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     Inspection result;
-    std::vector<Vec3> in_vain = measure_errors(mesh, result);
-    const std::vector<Vec3> missed = measure_distances(mesh, result);
-    in_vain.insert(in_vain.end(), missed.begin(), missed.end());
-    doubt(in_vain, kVainSpacing, result);
+    doubt(measure_errors(mesh, result), kVainSpacing, result);
+    measured_ = true;
+    for (std::size_t d = 0; d < distances_.size(); ++d) {
+        distances_[d].measure(mesh.vertices, mesh.carved.triangles, changes_);
+        take_missed(d, result);
+    }
     return result;
 }
 
-bool Inspector::is_missed(double distance) const {
-    return !(distance <= kCertified * limits_.tolerance);
+void Inspector::look_between(const FrameMesh& mesh, Inspection& inspection) {
+    // Where some crossings stand for others the cells do not have all of theirs.
+    if (crossings_.spacing() >= 2.0 * surface_.resolution()) return;
+    const auto& triangles = mesh.carved.triangles;
+    const auto points = between_crossings_.points(mesh.vertices, triangles, distances_.front());
+    if (points.empty()) return;
+    between_.emplace_back(points, surface_.resolution());
+    distances_.emplace_back(between_.back(), cutoff()).measure(mesh.vertices, triangles, {});
+    missed_.emplace_back();
+    take_missed(missed_.size() - 1, inspection);
+}
+
+std::vector<Surface::Crossing> Inspector::newly_missed(const Inspection& now,
+                                                       const std::vector<Vec3>& vertices,
+                                                       const std::vector<Triangle>& triangles) const {
+    const CrossingGrid grid(now.missed, limits_.tolerance);
+    std::vector<Surface::Crossing> result;
+    if (grid.empty()) return result;
+    const auto distances = crossing_distances(vertices, triangles, grid, kCertified * limits_.tolerance);
+    for (std::size_t c = 0; c < grid.size(); ++c)
+        if (std::isfinite(distances[c])) result.push_back(grid[c]);
+    return result;
+}
+
+void Inspector::forget_distances() {
+    for (MeshDistances& distances : distances_) distances.forget();
+    measured_ = false;
+    for (std::vector<int>& missed : missed_) missed.clear();
 }
 
 void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const {

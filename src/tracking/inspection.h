@@ -1,6 +1,7 @@
 // One frame's mesh held against its surface, and what would mend it.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -12,7 +13,9 @@
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/sizing.h"
 #include "isotrack/tracking/tracker.h"
+#include "tracking/between_crossings.h"
 #include "tracking/facets.h"
+#include "tracking/mesh_distances.h"
 #include "tracking/triangle_index.h"
 
 namespace isotrack {
@@ -25,11 +28,15 @@ struct FrameMesh {
 
 struct Inspection {
     std::shared_ptr<const std::vector<TriangleError>> errors;  ///< Per triangle; the inspector has them, too.
-    std::vector<Surface::Crossing> missed;  ///< Crossings farther from the mesh than the tolerance.
-    double farthest_crossing = 0.0, crossings_mean_square = 0.0;  ///< Of those that were found.
-    std::size_t lost_crossings = 0;                               ///< Those that were not.
+    /// Farther from the mesh than the tolerance: crossings, and points of the surface between such as are
+    /// nearly so far off or at folds of the mesh.
+    std::vector<Surface::Crossing> missed;
+    double farthest_crossing = 0.0;      ///< Of these and those, as far as they were found.
+    double crossings_mean_square = 0.0;  ///< Of the crossings that were found.
+    std::size_t lost_crossings = 0;      ///< Of these and those: not found.
     LatticeTopology topology;
-    std::vector<Shortage> doubtful;  ///< Crossings near its faults and near what was mended in vain.
+    std::vector<Shortage>
+        doubtful;  ///< Crossings near its faults and near what was mended in vain, and that.
 };
 
 /// The largest of `errors` (one per triangle) around each of so many particles; negative without a triangle.
@@ -41,8 +48,8 @@ std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector
 class Inspector {
 public:
     /// All three must outlive it.
-    Inspector(const Surface& surface, const SizingLimits& limits, const CrossingGrid& crossings)
-        : surface_(surface), limits_(limits), crossings_(crossings) {}
+    Inspector(const Surface& surface, const SizingLimits& limits, const CrossingGrid& crossings);
+    Inspector(Inspector&&) = default;  // and no copies: it points into itself
 
     /// From now on come meshes of other particles: those before are forgotten.
     void restart();
@@ -52,19 +59,29 @@ public:
 
     /// From mesh to surface alone.
     Inspection inspect(const FrameMesh& mesh);
-    /// From mesh to surface and back.
+    /// From mesh to surface and back: from crossings and from the points between them found so far.
     Inspection inspect_both_ways(const FrameMesh& mesh);
+    /// Of the mesh just inspected both ways: finds points between crossings that it may miss, and measures
+    /// them.
+    void look_between(const FrameMesh& mesh, Inspection& inspection);
+    /// What `now` misses and another mesh, of these vertices and triangles, does not. That nobody looked
+    /// there when it was inspected is no matter.
+    std::vector<Surface::Crossing> newly_missed(const Inspection& now, const std::vector<Vec3>& vertices,
+                                                const std::vector<Triangle>& triangles) const;
+    /// The points between crossings found so far.
+    const std::deque<CrossingGrid>& between() const { return between_; }
     /// What looking at the topology needs of the surface alone; done then if not before.
     void prepare_topology();
     /// The topology of the mesh just inspected.
     void inspect_topology(const FrameMesh& mesh, Inspection& inspection);
 
 private:
-    /// Measures the triangles that are not those of the mesh before. Both return what cannot be mended, or
-    /// was not when it was seen last.
+    /// Measures the triangles that are not those of the mesh before. Returns what cannot be mended, or was
+    /// not when it was seen last.
     std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
-    std::vector<Vec3> measure_distances(const FrameMesh& mesh, Inspection& result);
-    bool is_missed(double distance) const;
+    void take_missed(std::size_t d, Inspection& result);  // by distances_[d]
+    void forget_distances();
+    double cutoff() const;
     /// Adds the lattice crossings near some places to the doubtful ones; `spacing` in resolutions.
     void doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const;
 
@@ -75,13 +92,15 @@ private:
         TriangleIndex triangles;  // of particles
         std::vector<TriangleError> errors;
     };
-    std::optional<Expected> expected_;  // before the first inspection
-    double reach_ = 0.0;                // the largest of the distances, at most the cutoff
-    std::vector<Facet> facets_;         // of the last inspection
+    std::optional<Expected> expected_;                          // before the first inspection
+    std::vector<Facet> facets_;                                 // of the last inspection
     std::shared_ptr<const std::vector<TriangleError>> errors_;  // of each
-    std::vector<Facet> came_, went_;                            // since the inspection before
-    std::vector<double> distances_;  // to the facets, per crossing; empty: not measured yet
-    std::vector<int> missed_;        // of the crossings
+    FacetChanges changes_;                                      // since the inspection before
+    BetweenCrossings between_crossings_;
+    std::deque<CrossingGrid> between_;      // points between crossings, as they were found
+    std::deque<MeshDistances> distances_;   // to the facets: of the crossings, then of each of between_
+    bool measured_ = false;                 // and kept up to date from then on
+    std::vector<std::vector<int>> missed_;  // of each of distances_, ascending
     std::optional<LatticeSides> sides_;
     int looks_ = 0;  // at the topology
 };

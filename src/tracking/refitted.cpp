@@ -3,9 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <numeric>
-#include <set>
 #include <utility>
 
 #include "isotrack/meshing/refit.h"
@@ -58,6 +56,9 @@ public:
             sharpest = std::max(sharpest, sharpest_[u]);
         }
         return !(area_vector(t).dot(before) > 0.0) || !(sharpness_of(t) <= sharpest);
+    }
+    std::vector<Surface::Crossing> newly_missed(const Inspection& now, const Inspector& inspector) const {
+        return inspector.newly_missed(now, vertices_, triangles_);
     }
     bool is_near(std::size_t t, const Vec3& place) const {
         const auto box = [&](const std::vector<Vec3>& points, const Triangle& triangle) {
@@ -138,12 +139,6 @@ std::vector<char> poor_vertices(const FrameMesh& mesh, const Inspection& inspect
     return result;
 }
 
-std::set<std::array<double, 3>> places_of(const std::vector<Surface::Crossing>& crossings) {
-    std::set<std::array<double, 3>> result;
-    for (const auto& c : crossings) result.insert({c.point.x(), c.point.y(), c.point.z()});
-    return result;
-}
-
 }  // namespace
 
 Inspection refit_within(FrameMesh& mesh, const Inspection& before, const std::vector<char>& movable,
@@ -151,22 +146,19 @@ Inspection refit_within(FrameMesh& mesh, const Inspection& before, const std::ve
     std::vector<char> moving = poor_vertices(mesh, before, tolerance);
     for (std::size_t v = 0; v < moving.size(); ++v) moving[v] = moving[v] && movable[v];
     Refitted refitted(mesh, moving, surface, tolerance);
-    const auto missed_before = places_of(before.missed);
     for (;;) {
         Inspection inspection = inspector.inspect_both_ways(mesh);
+        inspector.look_between(mesh, inspection);
         std::vector<char> bad(mesh.carved.triangles.size(), 0);
-        std::vector<Vec3> newly_missed;
-        for (const auto& c : inspection.missed)
-            if (missed_before.count({c.point.x(), c.point.y(), c.point.z()}) == 0)
-                newly_missed.push_back(c.point);
+        const std::vector<Surface::Crossing> missed = refitted.newly_missed(inspection, inspector);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bad.size(), 1024), [&](const auto& range) {
             for (std::size_t t = range.begin(); t < range.end(); ++t)
                 bad[t] =
                     refitted.is_changed(t) &&
                     ((*inspection.errors)[t].largest > std::max(tolerance, (*before.errors)[t].largest) ||
-                     refitted.is_spoilt(t) ||
-                     std::any_of(newly_missed.begin(), newly_missed.end(),
-                                 [&](const Vec3& place) { return refitted.is_near(t, place); }));
+                     refitted.is_spoilt(t) || std::any_of(missed.begin(), missed.end(), [&](const auto& c) {
+                         return refitted.is_near(t, c.point);
+                     }));
         });
         for (const auto& [t, u] : self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}))
             if (refitted.is_changed(t) || refitted.is_changed(u)) bad[t] = bad[u] = 1;  // not there before

@@ -384,7 +384,8 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     const bool refines = !options.fit && options.method == Method::Tolerance &&
                          options.reconstruction == Reconstruction::Guided &&
                          options.delaunay != UpdateStrategy::Rebuild;
-    // The topology, which takes longer to look at, is looked at when all else passes.
+    // The topology, which takes longer to look at, is looked at when all else passes, and so is once more
+    // what lies between crossings.
     int relabellings = 0;
     for (int round = 0;; ++round) {
         if (round > 0 || added > 0) {
@@ -408,12 +409,14 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
             return relabel(labels, dt->cells(), mesh, inspection, particles, surface, l) == 0;
         };
         inspection = inspector->inspect_both_ways(mesh);
+        if (round == 0) inspector->look_between(mesh, inspection);
         bool good = passes();
         if (good && options.fit && fitted.undo_crossing(mesh, particles.size())) {
             inspection = inspector->inspect_both_ways(mesh);
             good = passes();
         }
         if (good) {
+            inspector->look_between(mesh, inspection);
             inspector->inspect_topology(mesh, inspection);
             if (passes()) break;
         }

@@ -22,9 +22,11 @@ struct Blunting {
 /// crossings, and stays so; its topology does not change.
 class Blunter {
 public:
-    /// All but `movable` (one entry per point) must outlive it; nobody else may change the mesh meanwhile.
+    /// `reached`: points of the surface, such as its lattice crossings, for triangles to stand for; more may
+    /// come between runs. All but `movable` (one entry per point) must outlive it; nobody else may change the
+    /// mesh meanwhile.
     Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
-            const Surface& surface, const CrossingGrid& crossings, double tolerance);
+            const Surface& surface, const std::vector<const CrossingGrid*>& reached, double tolerance);
 
     /// Looks at the triangles with an angle below 30 degrees, sharpest first, but for those that were looked
     /// at in vain and have not changed since; so often, or until nothing changes. Flips the longest edge, or
@@ -32,7 +34,7 @@ public:
     /// `tolerance` or more may become a quarter of that higher or lower where it must. A change is made where
     /// the smallest angle of the triangles concerned grows by a tenth or more or to 30 degrees, and all of
     /// them face the way the surface does (at a corner or the centroid), or no worse than before, are within
-    /// `tolerance` of it, leave no crossing that they stood for farther from the mesh than that and than it
+    /// `tolerance` of it, leave nothing that they stood for farther from the mesh than that and than it
     /// was, and cross no other triangle. Below 18 degrees corners may leave the surface, too. Points that
     /// move keep no more digits than floats. Returns whether anything changed.
     bool run(int passes);
@@ -54,7 +56,7 @@ private:
     std::vector<Triangle>& triangles_;
     std::vector<char> movable_, fixed_;  // fixed: a move was taken back
     const Surface& surface_;
-    const CrossingGrid& crossings_;
+    const std::vector<const CrossingGrid*>& reached_;
     double tolerance_;
     std::vector<char> open_;       // per vertex: triangles around it are to be looked at
     std::vector<char> unchecked_;  // per triangle: changed since crossings were looked for

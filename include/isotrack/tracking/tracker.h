@@ -71,9 +71,10 @@ struct TrackedFrame {
     std::string delaunay_strategy;
     double tolerance = 0.0;  ///< The one that was used.
     /// The larger of the distances mesh to surface (at 28 points of each triangle) and back (at the lattice
-    /// crossings, of which those nearer to each other than two tolerances stand for one another), measured on
-    /// `mesh`, world units; RMS likewise. Crossings farther than three tolerances from
-    /// any triangle that faces their way are counted as lost instead.
+    /// crossings, of which those nearer to each other than two tolerances stand for one another; where they
+    /// are so far apart anyway also at points between those that are nearly too far off or at folds of the
+    /// mesh), measured on `mesh`, world units; RMS likewise, but for the points between. What is farther than
+    /// three tolerances from any triangle that faces its way is counted as lost instead.
     double max_error = 0.0, rms_error = 0.0;
     bool opened = false;             ///< A cap was left out: the mesh has a border there.
     std::size_t lost_crossings = 0;  ///< Features below the grid's resolution that the mesh does not hold.

@@ -1,0 +1,183 @@
+#include "surface/cell_points.h"
+
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "find_in_blocks.h"
+
+namespace isotrack {
+namespace {
+
+constexpr int kBits = 21;  // of a cell's coordinate
+constexpr double kHalfRange = 1 << (kBits - 1);
+constexpr double kAtNode = 1e-4;  // of an edge
+
+std::uint64_t packed(const Vec3& cell) {
+    std::uint64_t result = 0;
+    for (int axis = 0; axis < 3; ++axis)
+        result = result << kBits |
+                 static_cast<std::uint64_t>(std::clamp(cell[axis] + kHalfRange, 0.0, 2.0 * kHalfRange - 1.0));
+    return result;
+}
+
+Vec3 unpacked(std::uint64_t cell) {
+    constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
+    Vec3 result;
+    for (int axis = 0; axis < 3; ++axis)
+        result[axis] = static_cast<double>(cell >> (2 - axis) * kBits & kMask) - kHalfRange;
+    return result;
+}
+
+/// Lattice crossings in lattice units.
+class LatticeEdges {
+public:
+    explicit LatticeEdges(const Eigen::Affine3d& lattice) : to_lattice_(lattice.inverse()) {
+        for (int axis = 0; axis < 3; ++axis) along_[axis] = lattice.linear().col(axis).normalized();
+    }
+    struct Edge {
+        Vec3 low;  // its lower end
+        int axis;
+        bool upward;  // goes out there
+    };
+    Edge edge_of(const Surface::Crossing& crossing) const {
+        const Vec3 outward = crossing.outward.cast<double>();
+        int axis = 0;
+        for (int other = 1; other < 3; ++other)
+            if (std::abs(along_[other].dot(outward)) > std::abs(along_[axis].dot(outward))) axis = other;
+        const Vec3 p = to_lattice_ * crossing.point;
+        Vec3 low = p.array().round();
+        const bool upward = along_[axis].dot(outward) > 0.0;
+        // At a node, which is outside as all are where the value is 0, the edge is the one that goes out to
+        // it.
+        const bool at_node = std::abs(p[axis] - low[axis]) < kAtNode;
+        low[axis] = at_node ? low[axis] - upward : std::floor(p[axis]);
+        return {low, axis, upward};
+    }
+
+private:
+    const Eigen::Affine3d to_lattice_;
+    Vec3 along_[3];
+};
+
+/// The crossings of a cell. Its corner k is bit 0 of k along the first axis, bit 1 along the second, bit 2
+/// along the third.
+class Cell {
+public:
+    void clear() {
+        count_ = 0;
+        crossed_.fill(-1);
+    }
+    void add(int low_corner, int axis, bool upward, const Surface::Crossing& crossing) {
+        int& at = crossed_[3 * low_corner + axis];
+        if (at >= 0) return;
+        at = count_;
+        const int high_corner = low_corner | 1 << axis;
+        crossings_[count_++] = {crossing.point, crossing.outward, upward ? low_corner : high_corner,
+                                upward ? high_corner : low_corner};
+    }
+
+    /// Crossings are of one part of the surface when the corners inside at them are joined by edges without a
+    /// crossing, and those outside, too.
+    void add_means(std::vector<Surface::Crossing>& means) const {
+        const std::array<int, 8> part = joined_corners();
+        std::array<bool, 12> done{};
+        for (int i = 0; i < count_; ++i) {
+            if (done[i]) continue;
+            Vec3 sum = Vec3::Zero();
+            std::array<int, 12> with{};  // of each: crossings of its part with its direction
+            int members = 0, most = i;
+            for (int j = i; j < count_; ++j) {
+                if (part[crossings_[j].inside] != part[crossings_[i].inside] ||
+                    part[crossings_[j].outside] != part[crossings_[i].outside])
+                    continue;
+                done[j] = true;
+                sum += crossings_[j].point;
+                ++members;
+                int first = i;
+                while (crossings_[first].outward != crossings_[j].outward) ++first;
+                if (++with[first] > with[most]) most = first;
+            }
+            means.push_back({sum / members, crossings_[most].outward});
+        }
+    }
+
+private:
+    /// A number for each corner: the same for those that edges without a crossing join.
+    std::array<int, 8> joined_corners() const {
+        std::array<int, 8> part{0, 1, 2, 3, 4, 5, 6, 7};
+        for (bool again = true; again;) {
+            again = false;
+            for (int k = 0; k < 8; ++k)
+                for (int axis = 0; axis < 3; ++axis) {
+                    const int l = k | 1 << axis;
+                    if (l == k || crossed_[3 * k + axis] >= 0 || part[k] == part[l]) continue;
+                    part[k] = part[l] = std::min(part[k], part[l]);
+                    again = true;
+                }
+        }
+        return part;
+    }
+
+    struct Crossing {
+        Vec3 point;
+        Eigen::Vector3f outward;
+        int inside, outside;  // corners
+    };
+    std::array<Crossing, 12> crossings_;
+    std::array<int, 24> crossed_;  // by lower corner and axis: which crossing, or -1
+    int count_ = 0;
+};
+
+}  // namespace
+
+std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) {
+    const LatticeEdges edges(lattice_);
+    constexpr std::size_t kBlock = 512;
+    auto wanted = find_in_blocks<std::uint64_t>(
+        some.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<std::uint64_t>& found) {
+            for (std::size_t i = begin; i < end; ++i) {
+                const auto [low, axis, upward] = edges.edge_of(crossings_[some[i]]);
+                for (const double u : {0.0, 1.0})
+                    for (const double w : {0.0, 1.0}) {
+                        Vec3 cell = low;
+                        cell[(axis + 1) % 3] -= u;
+                        cell[(axis + 2) % 3] -= w;
+                        found.push_back(packed(cell));
+                    }
+            }
+        });
+    tbb::parallel_sort(wanted.begin(), wanted.end());
+    wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
+    std::vector<std::uint64_t> fresh, all;
+    std::set_difference(wanted.begin(), wanted.end(), given_.begin(), given_.end(),
+                        std::back_inserter(fresh));
+    std::merge(fresh.begin(), fresh.end(), given_.begin(), given_.end(), std::back_inserter(all));
+    given_ = std::move(all);
+
+    constexpr double kRounding = 0.01;
+    const Vec3 half = 0.5 * (1.0 + kRounding) * lattice_.linear().cwiseAbs().rowwise().sum();
+    return find_in_blocks<Surface::Crossing>(
+        fresh.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<Surface::Crossing>& found) {
+            Cell cell;
+            for (std::size_t i = begin; i < end; ++i) {
+                const Vec3 origin = unpacked(fresh[i]), middle = lattice_ * (origin.array() + 0.5).matrix();
+                cell.clear();
+                crossings_.for_each_in(Box(middle - half, middle + half), [&](std::size_t c) {
+                    const Surface::Crossing crossing = crossings_[c];
+                    const auto [low, axis, upward] = edges.edge_of(crossing);
+                    const Vec3 from = low - origin;
+                    if (from[axis] != 0.0 || from.minCoeff() < 0.0 || from.maxCoeff() > 1.0) return;
+                    const int corner = static_cast<int>(from.x() + 2.0 * from.y() + 4.0 * from.z());
+                    cell.add(corner, axis, upward, crossing);
+                });
+                cell.add_means(found);
+            }
+        });
+}
+
+}  // namespace isotrack

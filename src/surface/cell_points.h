@@ -1,0 +1,29 @@
+// Where a surface passes through the cells of its lattice, as its crossings have it.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "isotrack/surface/crossing_grid.h"
+
+namespace isotrack {
+
+class CellPoints {
+public:
+    /// `crossings`: all of `lattice`, none that stands for others. They must outlive it.
+    CellPoints(const CrossingGrid& crossings, const Eigen::Affine3d& lattice)
+        : crossings_(crossings), lattice_(lattice) {}
+
+    /// In the cells around the edges that some crossings are on: for each part of the surface in a cell the
+    /// mean of its crossings, where dual meshing has its vertices. Outward is the direction of the lattice
+    /// that most of them go. Cells given before are left out. In an order that does not depend on the number
+    /// of threads.
+    std::vector<Surface::Crossing> around(const std::vector<int>& some);
+
+private:
+    const CrossingGrid& crossings_;
+    const Eigen::Affine3d lattice_;
+    std::vector<std::uint64_t> given_;  // packed cells, ascending
+};
+
+}  // namespace isotrack

@@ -1,0 +1,74 @@
+#include "tracking/between_crossings.h"
+
+#include <tbb/parallel_for.h>
+
+#include <array>
+#include <atomic>
+
+#include "tracking/failing.h"
+
+namespace isotrack {
+namespace {
+
+constexpr double kNearlyTooFar = 0.92, kNearlyAtFolds = 0.1;  // of the tolerance
+constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
+
+template <typename Body>
+void for_each_index(std::size_t count, const Body& body) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1024), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
+    });
+}
+
+/// Flags for the vertices where triangles meet at an angle.
+std::vector<char> folded_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles) {
+    std::vector<Eigen::Vector3f> area(triangles.size());
+    for_each_index(triangles.size(), [&](std::size_t t) {
+        const auto& [i, j, k] = triangles[t];
+        area[t] = (vertices[j] - vertices[i]).cross(vertices[k] - vertices[i]).cast<float>();
+    });
+    std::vector<Eigen::Vector3f> sum(vertices.size(), Eigen::Vector3f::Zero());
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        for (const int v : triangles[t]) sum[v] += area[t];
+    std::vector<std::array<char, 3>> folded(triangles.size());  // at each corner
+    for_each_index(triangles.size(), [&](std::size_t t) {
+        for (int k = 0; k < 3; ++k) {
+            const Eigen::Vector3f& normal = sum[triangles[t][k]];
+            folded[t][k] = !(area[t].dot(normal) >= kFold * area[t].norm() * normal.norm());
+        }
+    });
+    std::vector<char> result(vertices.size(), 0);
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        for (int k = 0; k < 3; ++k) result[triangles[t][k]] |= folded[t][k];
+    return result;
+}
+
+}  // namespace
+
+std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>& vertices,
+                                                        const std::vector<Triangle>& triangles,
+                                                        const MeshDistances& at_crossings) {
+    std::vector<std::atomic<char>> at_fold(crossings_.size());
+    const std::vector<char> folded = folded_vertices(vertices, triangles);
+    const Vec3 reach = Vec3::Constant(tolerance_);
+    for_each_index(triangles.size(), [&](std::size_t t) {
+        const auto& [i, j, k] = triangles[t];
+        if (!folded[i] && !folded[j] && !folded[k]) return;
+        Box box;
+        for (const int v : triangles[t]) box.extend(vertices[v]);
+        crossings_.for_each_in(Box(box.min() - reach, box.max() + reach),
+                               [&](std::size_t c) { at_fold[c].store(1, std::memory_order_relaxed); });
+    });
+    std::vector<int> doubtful;
+    looked_at_.resize(crossings_.size(), 0);
+    for (const int c : at_crossings.survey(kNearlyAtFolds * tolerance_).beyond) {
+        const double d = at_crossings[c];
+        if (looked_at_[c] || d > kCertified * tolerance_ || !(at_fold[c] || d > kNearlyTooFar * tolerance_))
+            continue;
+        looked_at_[c] = 1;
+        doubtful.push_back(c);
+    }
+    return cells_.around(doubtful);
+}
+
+}  // namespace isotrack

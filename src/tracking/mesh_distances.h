@@ -1,0 +1,46 @@
+// How far points of a surface are from a mesh, and then from meshes a little different from it.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "isotrack/meshing/manifold.h"
+#include "isotrack/surface/crossing_grid.h"
+#include "isotrack/types.h"
+#include "tracking/facets.h"
+
+namespace isotrack {
+
+/// From the mesh before to this.
+struct FacetChanges {
+    std::vector<Facet> came, went;
+    bool many = false;  ///< So many that all distances had better be measured again.
+};
+
+class MeshDistances {
+public:
+    /// Distances as those of `crossing_distances`, with its `cutoff`. `points` must outlive it.
+    MeshDistances(const CrossingGrid& points, double cutoff) : points_(points), cutoff_(cutoff) {}
+
+    void forget() { distances_.clear(); }
+    /// `changes`: since the mesh measured last, if there is one.
+    void measure(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+                 const FacetChanges& changes);
+
+    struct Survey {
+        std::vector<int> beyond;  ///< The points farther than a limit, lost ones among them; ascending.
+        std::size_t lost = 0;     ///< Those beyond the cutoff.
+        double farthest = 0.0, sum_of_squares = 0.0;  ///< Of those that are not lost.
+    };
+    Survey survey(double limit) const;
+
+    const CrossingGrid& points() const { return points_; }
+    double operator[](std::size_t point) const { return distances_[point]; }
+
+private:
+    const CrossingGrid& points_;
+    const double cutoff_;
+    std::vector<double> distances_;  // empty: not measured yet
+};
+
+}  // namespace isotrack
