@@ -82,14 +82,12 @@ void FrameWork::blunt() {
              places = spoilt(false))
             again = true;
     }
+    if (again) inspector->look_between(mesh, inspection);  // where something was taken back last
 }
 
 TrackedFrame FrameWork::finish(const TrackerOptions& options) {
-    if (options.method != Method::Paper) {
-        blunt();
-        if (options.fit) refit();
-        inspector->look_between(mesh, inspection);
-    }
+    if (options.method != Method::Paper) blunt();
+    if (options.method != Method::Paper && options.fit) refit();
     report(mesh, inspection, limits, frame);
     frame.mesh.points = std::move(mesh.vertices);
     frame.mesh.triangles = std::move(mesh.carved.triangles);

@@ -409,14 +409,16 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
             return relabel(labels, dt->cells(), mesh, inspection, particles, surface, l) == 0;
         };
         inspection = inspector->inspect_both_ways(mesh);
-        if (round == 0) inspector->look_between(mesh, inspection);
+        bool between = round == 0;
+        if (between) inspector->look_between(mesh, inspection);
         bool good = passes();
         if (good && options.fit && fitted.undo_crossing(mesh, particles.size())) {
             inspection = inspector->inspect_both_ways(mesh);
+            between = false;
             good = passes();
         }
         if (good) {
-            inspector->look_between(mesh, inspection);
+            if (!between) inspector->look_between(mesh, inspection);
             inspector->inspect_topology(mesh, inspection);
             if (passes()) break;
         }
