@@ -164,15 +164,19 @@ std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
         const int there = add_or_nearest(s.place, wanted);
         if (there < 0 || there >= first_of_call_ || surrounded[there]) continue;
         surrounded[there] = 1;
-        const double h = kShrink * std::min(wanted, particles_.spacing[there]);
-        if (h < std::max(min_spacing_, s.least)) continue;
-        particles_.spacing[there] = h;
         const Vec3 p = particles_.position[there], a = particles_.normal[there].unitOrthogonal(),
                    b = particles_.normal[there].cross(a);
-        const double turn = kGoldenAngle * static_cast<double>(particles_.size());  // rings do not line up
-        for (int k = 0; k < kAround; ++k) {
-            const double angle = turn + 2.0 * kPi * k / kAround;
-            add_or_nearest(p + h * (std::cos(angle) * a + std::sin(angle) * b), h);
+        const std::size_t so_far = particles_.size();
+        // On what is smaller than the ring there may be no place for any of it.
+        while (particles_.size() == so_far) {
+            const double h = kShrink * std::min(wanted, particles_.spacing[there]);
+            if (h < std::max(min_spacing_, s.least)) break;
+            particles_.spacing[there] = h;
+            const double turn = kGoldenAngle * static_cast<double>(particles_.size());  // rings do not line up
+            for (int k = 0; k < kAround; ++k) {
+                const double angle = turn + 2.0 * kPi * k / kAround;
+                add_or_nearest(p + h * (std::cos(angle) * a + std::sin(angle) * b), h);
+            }
         }
     }
     return particles_.size() - before;

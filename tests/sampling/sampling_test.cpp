@@ -523,6 +523,18 @@ TEST(Densifier, GivesRoomForOneAtATimeWhereParticlesAreFarApart) {
     EXPECT_NEAR(particles.spacing.back(), 0.8, 1e-6);
 }
 
+TEST(Densifier, GetsDenserUntilASmallBodyHasRoomForMore) {
+    // Places at the wanted distance from the particle on a ball are none of the ball's, or are taken.
+    const auto ball = shapes::sphere({0, 0, 0}, 0.03, 0.1);
+    Particles particles;
+    particles.add({0, 0, 0.03}, {0, 0, 1}, 1.0, 0);
+    Id next_id = 1;
+    Densifier densifier(particles, *ball, 1e-4, 1000, next_id);
+    EXPECT_EQ(densifier.add({{{0, 0, 0.03}, 0.4, 0.1}}), 0u);
+    EXPECT_GT(densifier.add({{{0, 0, 0.03}, 0.4, 0.001}}), 0u);
+    EXPECT_LT(particles.spacing[0], 0.1);
+}
+
 TEST(CoordinateDescent, SpreadsParticlesOverAnEllipsoidByItsCurvature) {
     const auto ellipsoid = shapes::ellipsoid({0, 0, 0}, {1.0, 0.5, 0.5}, 0.02);
     SizingLimits limits{};

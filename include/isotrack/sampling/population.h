@@ -50,7 +50,8 @@ public:
     /// least 0.7 of the wanted spacing, or of that of the nearest particle, from those that face the same
     /// way. A particle that was there before and is nearer is surrounded instead: its spacing becomes 0.6 of
     /// the smaller of its own and the wanted one, down to `min_spacing` and `least`, and six more are added
-    /// around it at that distance, so that repeated calls get denser. Where there is room for more than the
+    /// around it at that distance, so that repeated calls get denser; where there is no place for any, as on
+    /// what is smaller than the ring, it becomes smaller still. Where there is room for more than the
     /// wanted spacing a particle takes the distance to the nearest for its own (up to ten times the wanted
     /// one and eight resolutions), and no other of the same call is added within 0.7 of that: it is seen
     /// first what the one has mended. Returns how many were added: 0 means that nothing more can be done.
