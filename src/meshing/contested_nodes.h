@@ -16,8 +16,9 @@ struct Contested {
     /// two are the graphs of functions over the same lines, and their nodes can be put right in any order,
     /// each a simple point.
     std::vector<Node> nodes;
-    /// Per component: it holds a node on its own. The mesh is taken to consist of those that do.
-    std::vector<char> holds_node;
+    /// Per component: it holds a node on its own and is not torn off others. The mesh is taken to consist of
+    /// those that do and are not.
+    std::vector<char> counts;
 };
 
 /// `points` in lattice units; `component` per triangle, below `components`.

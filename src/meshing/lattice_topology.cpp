@@ -10,7 +10,7 @@
 #include <tuple>
 
 #include "meshing/contested_nodes.h"
-#include "surface/ambiguous_faces.h"
+#include "meshing/lattice_neighbours.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -35,78 +35,6 @@ std::vector<int> component_of_triangles(std::size_t vertices, const std::vector<
         result.push_back(n);
     }
     return result;
-}
-
-/// Sets of a node's 26 neighbours as bits; bit 9 (x + 1) + 3 (y + 1) + z + 1, the node itself is bit 13.
-int bit_of(int x, int y, int z) {
-    return 9 * (x + 1) + 3 * (y + 1) + z + 1;
-}
-
-struct Neighbourhoods {
-    std::uint32_t touching[27] = {};  // neighbours that share a corner, an edge or a face
-    std::uint32_t beside[27] = {};    // neighbours that share a face
-    std::uint32_t all = 0, at_face = 0, no_corner = 0;
-    Neighbourhoods() {
-        const auto each = [](const auto& body) {
-            for (int x = -1; x <= 1; ++x)
-                for (int y = -1; y <= 1; ++y)
-                    for (int z = -1; z <= 1; ++z) body(x, y, z);
-        };
-        each([&](int x, int y, int z) {
-            const int i = bit_of(x, y, z), far = std::abs(x) + std::abs(y) + std::abs(z);
-            if (far == 0) return;
-            all |= 1u << i;
-            if (far == 1) at_face |= 1u << i;
-            if (far <= 2) no_corner |= 1u << i;
-            each([&](int u, int v, int w) {
-                const int dx = std::abs(u - x), dy = std::abs(v - y), dz = std::abs(w - z);
-                if ((u == 0 && v == 0 && w == 0) || std::max({dx, dy, dz}) != 1) return;
-                touching[i] |= 1u << bit_of(u, v, w);
-                if (dx + dy + dz == 1) beside[i] |= 1u << bit_of(u, v, w);
-            });
-        });
-    }
-};
-
-/// The bits of `set` that are connected with its bits in `seed`.
-std::uint32_t spread(std::uint32_t seed, std::uint32_t set, const std::uint32_t* near) {
-    std::uint32_t found = seed & set, rim = found;
-    while (rim != 0) {
-        std::uint32_t next = 0;
-        for (; rim != 0; rim &= rim - 1) next |= near[__builtin_ctz(rim)];
-        rim = next & set & ~found;
-        found |= rim;
-    }
-    return found;
-}
-
-/// Whether a node may change sides without changing the topology of either [Bertrand, Malandain 1994]: the
-/// inside around it is one 26-connected set, and the outside that reaches it through a face is one
-/// 6-connected set within its 18 nearest neighbours. `inside`: the neighbours that are inside.
-bool is_simple(std::uint32_t inside) {
-    static const Neighbourhoods around;
-    inside &= around.all;
-    const std::uint32_t outside = ~inside & around.no_corner, reached = outside & around.at_face;
-    if (inside == 0 || reached == 0) return false;
-    const auto lowest = [](std::uint32_t set) { return set & (~set + 1u); };
-    if (spread(lowest(inside), inside, around.touching) != inside) return false;
-    return (reached & ~spread(lowest(reached), outside, around.beside)) == 0;
-}
-
-/// Whether volumeToMesh joins an inside node with the one at `to`, inside as well: through a face always;
-/// across the diagonal of a face whose other two nodes are outside sometimes; never across a cell. `inside`:
-/// of the nodes around the first, as above. Nodes that are joined through a third one are so anyway.
-bool is_joined(std::uint32_t inside, const Node& to) {
-    const auto axes = 3 - std::count(to.begin(), to.end(), 0);
-    if (axes != 2) return axes == 1;
-    const auto off = static_cast<int>(std::find(to.begin(), to.end(), 0) - to.begin());  // across the face
-    return joins_diagonal([&](int side, int first, int second) {
-        Node n;
-        n[off] = 2 * side - 1;
-        n[(off + 1) % 3] = first * to[(off + 1) % 3];
-        n[(off + 2) % 3] = second * to[(off + 2) % 3];
-        return (inside >> bit_of(n[0], n[1], n[2]) & 1u) != 0;
-    });
 }
 
 /// Whether a segment from p to q crosses a triangle, by the signs of volumes: an edge that the segment
@@ -235,9 +163,9 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
     for (const Vec3& p : points) in_lattice.push_back(to_lattice * p);
     int components = 0;
     const std::vector<int> component = component_of_triangles(points.size(), triangles, components);
-    const auto [wrong, holds_node] = contested_nodes(in_lattice, triangles, component, components, sides);
+    const auto [wrong, counts] = contested_nodes(in_lattice, triangles, component, components, sides);
     LatticeTopology result;
-    for (const int c : component) result.speck.push_back(!holds_node[c]);
+    for (const int c : component) result.speck.push_back(!counts[c]);
 
     std::vector<Around> around = look_around(wrong, sides);
     // Inside nodes that hang together, none of them inside the mesh, are a component that is lost even where

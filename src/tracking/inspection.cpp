@@ -7,7 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "sampling/compact.h"
 #include "surface/lattice_scan.h"
 #include "tracking/failing.h"
 
@@ -19,7 +18,7 @@ constexpr double kMany = 0.3;        // of the triangles: when more change all d
 constexpr double kFaultReach = 1.5;  // resolutions
 constexpr double kMissedSpacing = 0.75;                    // resolutions
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
-constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
+constexpr double kLeastDoubtful = 0.003;  // resolutions: denser than that nothing near a fault was mended
 
 struct Corners {
     Triangle particle;
@@ -333,78 +332,6 @@ void report(const FrameMesh& mesh, const Inspection& inspection, const SizingLim
     frame.rms_error =
         std::sqrt(std::max(weight > 0.0 ? sum / weight : 0.0, inspection.crossings_mean_square));
     frame.within_tolerance = frame.max_error <= limits.tolerance && frame.lost_crossings == 0;
-}
-
-namespace {
-
-FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out) {
-    FrameMesh result = mesh;
-    CarvedSurface& carved = result.carved;
-    std::vector<char> keep;
-    for (const char flag : left_out) keep.push_back(!flag);
-    compact(carved.triangles, keep);
-    compact(carved.inside_cell, keep);
-    compact(carved.inside_facet, keep);
-    keep.assign(mesh.vertices.size(), 0);
-    for (const Triangle& t : carved.triangles)
-        for (const int v : t) keep[v] = 1;
-    compact(result.vertices, keep);
-    compact(result.on_surface, keep);
-    compact(carved.particle, keep);
-    const std::vector<int> number = numbers_after(keep);
-    for (Triangle& t : carved.triangles)
-        for (int& v : t) v = number[v];
-    return result;
-}
-
-/// Takes the flags off the components with a triangle whose box is within `distance` of one of `places`.
-/// Returns whether there were any.
-bool spare_near(const std::vector<Surface::Crossing>& places, double distance, const FrameMesh& mesh,
-                std::vector<char>& flags) {
-    std::vector<char> spared(mesh.vertices.size(), 0);
-    const auto spare = [&](std::size_t t) {
-        flags[t] = 0;
-        for (const int v : mesh.carved.triangles[t]) spared[v] = 1;
-    };
-    bool any = false;
-    for (std::size_t t = 0; t < flags.size(); ++t) {
-        if (!flags[t]) continue;
-        Box box;
-        for (const int v : mesh.carved.triangles[t]) box.extend(mesh.vertices[v]);
-        if (std::none_of(places.begin(), places.end(),
-                         [&](const auto& c) { return box.exteriorDistance(c.point) <= distance; }))
-            continue;
-        spare(t);
-        any = true;
-    }
-    for (bool more = any; more;) {
-        more = false;
-        for (std::size_t t = 0; t < flags.size(); ++t) {
-            const auto& [i, j, k] = mesh.carved.triangles[t];
-            if (!flags[t] || !(spared[i] || spared[j] || spared[k])) continue;
-            spare(t);
-            more = true;
-        }
-    }
-    return any;
-}
-
-}  // namespace
-
-void remove_specks(FrameMesh& mesh, Inspection& inspection, Inspector& inspector,
-                   const SizingLimits& limits) {
-    std::vector<char> specks = inspection.topology.speck;
-    if (std::find(specks.begin(), specks.end(), 1) == specks.end()) return;
-    for (;;) {
-        FrameMesh rest = without(mesh, specks);
-        Inspection after = inspector.inspect_both_ways(rest);
-        if (after.missed.size() > inspection.missed.size() &&
-            spare_near(after.missed, limits.tolerance, mesh, specks))
-            continue;
-        mesh = std::move(rest);
-        inspection = std::move(after);
-        return;
-    }
 }
 
 }  // namespace isotrack

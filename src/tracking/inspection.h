@@ -117,8 +117,4 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
 void report(const FrameMesh& mesh, const Inspection& inspection, const SizingLimits& limits,
             TrackedFrame& frame);
 
-/// Takes components without a lattice node off the mesh just inspected, but for those that stand for
-/// crossings which nothing else stands for.
-void remove_specks(FrameMesh& mesh, Inspection& inspection, Inspector& inspector, const SizingLimits& limits);
-
 }  // namespace isotrack

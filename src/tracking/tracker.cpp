@@ -27,9 +27,11 @@
 #include "tracking/frame_work.h"
 #include "tracking/handles.h"
 #include "tracking/inspection.h"
+#include "tracking/label_trials.h"
 #include "tracking/last_mesh.h"
 #include "tracking/refinement.h"
 #include "tracking/relabelling.h"
+#include "tracking/specks.h"
 #include "tracking/stage_timer.h"
 
 namespace isotrack {
@@ -427,17 +429,22 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     last_mesh.take(mesh.carved, particles, dt->cells());
     {
         const StageTimer timer(seconds, "certify");
-        const auto carve_labels = [&](CellLabels& of_cells) { return mesh_of(of_cells, surface); };
-        const auto fit_other = [&](FrameMesh& other) {
+        const LabelTrials::Carve carve_labels = [&](CellLabels& of_cells) {
+            return mesh_of(of_cells, surface);
+        };
+        const LabelTrials::Fit fit_other = [&](FrameMesh& other) {
             if (!options.fit) return;
             Fitted its_own = fitted;
             its_own.fit_vertices(other, particles.size(), surface);
             its_own.undo_crossing(other, particles.size());
         };
-        if (options.method == Method::Tolerance && options.reconstruction == Reconstruction::Guided &&
-            mend_handles(labels, dt->cells(), mesh, inspection, *inspector, particles,
-                         last_mesh.evidence.thickness, surface, l, carve_labels, fit_other) > 0)
-            last_mesh.take(mesh.carved, particles, dt->cells());
+        if (options.method == Method::Tolerance && options.reconstruction == Reconstruction::Guided) {
+            LabelTrials trials(labels, mesh, inspection, *inspector, l, carve_labels, fit_other);
+            const std::size_t joined = join_specks(trials, dt->cells(), particles, surface, l);
+            if (mend_handles(trials, dt->cells(), particles, last_mesh.evidence.thickness, surface) + joined >
+                0)
+                last_mesh.take(mesh.carved, particles, dt->cells());
+        }
         remove_specks(mesh, inspection, *inspector, l);
     }
     inherit_velocities(particle_triangles(mesh.carved), first_new);

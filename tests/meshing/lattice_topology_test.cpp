@@ -119,6 +119,83 @@ LevelSet level_set_of(const std::vector<openvdb::Coord>& inside) {
     return LevelSet(grid);
 }
 
+/// An ellipsoid of round cross section around the nodes from `low` to `high`, which share a line or are one.
+TriangleMesh body_around(const Vec3& low, const Vec3& high) {
+    TriangleMesh mesh = icosphere(3, {0, 0, 0}, 1.0);
+    const Vec3 half = 0.5 * (high - low);
+    const Vec3 axes = (half.array() > 0.0).select((half.array() + 0.4).matrix(), Vec3::Constant(0.35));
+    for (Vec3& p : mesh.points) p = 0.5 * (low + high) + p.cwiseProduct(axes);
+    return mesh;
+}
+
+std::vector<char> specks_of(const std::vector<TriangleMesh>& bodies, const LevelSet& level_set) {
+    TriangleMesh mesh = bodies[0];
+    for (std::size_t b = 1; b < bodies.size(); ++b) mesh = join(mesh, bodies[b]);
+    const LatticeTopology found = topology_of(mesh, level_set);
+    std::vector<char> result;
+    std::size_t t = 0;
+    for (const TriangleMesh& body : bodies) {
+        const auto count = static_cast<long>(body.triangles.size());
+        const auto flagged = std::count_if(found.speck.begin() + static_cast<long>(t),
+                                           found.speck.begin() + static_cast<long>(t) + count,
+                                           [](char flag) { return flag != 0; });
+        EXPECT_TRUE(flagged == 0 || flagged == count);
+        result.push_back(flagged > 0);
+        t += body.triangles.size();
+    }
+    return result;
+}
+
+TEST(LatticeTopology, CallsASmallPartThatIsTornOffASpeck) {
+    std::vector<openvdb::Coord> row;
+    for (int x = -6; x <= 4; ++x) row.emplace_back(x, 0, 0);
+    const LevelSet rod = level_set_of(row);
+    const TriangleMesh most = body_around({-6, 0, 0}, {0, 0, 0});
+    EXPECT_EQ(specks_of({most, body_around({1, 0, 0}, {4, 0, 0})}, rod), (std::vector<char>{0, 1}));
+    // Nodes between them that nobody holds join them as well.
+    EXPECT_EQ(specks_of({most, body_around({3, 0, 0}, {4, 0, 0})}, rod), (std::vector<char>{0, 1}));
+    // Of two that are torn off each other the one with fewer nodes is.
+    row.assign({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}});
+    const TriangleMesh one = body_around({0, 0, 0}, {0, 0, 0}), two = body_around({1, 0, 0}, {2, 0, 0});
+    EXPECT_EQ(specks_of({two, one}, level_set_of(row)), (std::vector<char>{0, 1}));
+    EXPECT_EQ(specks_of({one, two}, level_set_of(row)), (std::vector<char>{1, 0}));
+    // What is on its own is none, nor is what is large.
+    row.erase(row.begin() + 1);
+    EXPECT_EQ(specks_of({one, body_around({2, 0, 0}, {2, 0, 0})}, level_set_of(row)),
+              (std::vector<char>{0, 0}));
+    row.clear();
+    for (int x = -7; x <= 7; ++x) row.emplace_back(x, 0, 0);
+    EXPECT_EQ(specks_of({body_around({-7, 0, 0}, {-1, 0, 0}), body_around({1, 0, 0}, {7, 0, 0})},
+                        level_set_of(row)),
+              (std::vector<char>{0, 0}));
+}
+
+TEST(LatticeTopology, TakesPartsForTornOffWhereVolumeToMeshJoinsThem) {
+    std::mt19937 random(11);
+    int apart = 0, joined = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+        // Two nodes across a face or a cell, each with some of the nodes behind it.
+        const openvdb::Coord to(1, 1, trial % 3 == 0);
+        std::vector<openvdb::Coord> inside = {{0, 0, 0}, to};
+        std::vector<TriangleMesh> bodies = {body_around({0, 0, 0}, {0, 0, 0}),
+                                            body_around(Vec3(1, 1, to.z()), Vec3(1, 1, to.z()))};
+        for (const int end : {0, 1})
+            if (random() % 2) {
+                const int z = end * to.z(), step = end == 0 && to.z() ? -1 : random() % 2 ? 1 : -1;
+                inside.emplace_back(end, end, z + step);
+                bodies[end] =
+                    body_around(Vec3(end, end, std::min(z, z + step)), Vec3(end, end, std::max(z, z + step)));
+            }
+        const LevelSet level_set = level_set_of(inside);
+        const bool is_one = mesh_topology(volume_to_mesh(level_set)).components == 1;
+        const std::vector<char> specks = specks_of(bodies, level_set);
+        EXPECT_EQ(specks[0] + specks[1], is_one ? 1 : 0) << trial;
+        ++(is_one ? joined : apart);
+    }
+    EXPECT_GT(apart, 10);
+    EXPECT_GT(joined, 10);
+}
+
 TEST(LatticeTopology, CountsAComponentThatVolumeToMeshPartsFromOthersAsMissing) {
     std::mt19937 random(3);
     int parted = 0, joined = 0;

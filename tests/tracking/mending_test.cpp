@@ -18,6 +18,7 @@
 #include "tracking/inspection.h"
 #include "tracking/refitted.h"
 #include "tracking/relabelling.h"
+#include "tracking/specks.h"
 
 namespace isotrack {
 namespace {
@@ -50,6 +51,12 @@ struct Carved {
             result.vertices.push_back(p >= 0 ? particles.position[p] : result.carved.midpoints[midpoint++]);
         result.on_surface = result.vertices;
         return result;
+    }
+    LabelTrials::Carve carve_labels() {
+        return [this](CellLabels& of_cells) {
+            labels = of_cells;
+            return mesh();
+        };
     }
     Inspection inspect(const FrameMesh& mesh) const {
         Inspection result;
@@ -286,22 +293,80 @@ TEST(Handles, FillsAHoleInAThinSheet) {
     const CrossingGrid crossings(disk);
     Inspector inspector(disk, carved.limits, crossings);
     Inspection inspection = inspector.inspect_both_ways(mesh);
+    inspector.look_between(mesh, inspection);
     inspector.inspect_topology(mesh, inspection);
-    const auto carve_labels = [&](CellLabels& labels) {
-        carved.labels = labels;
-        return carved.mesh();
-    };
     const std::vector<double> thickness(carved.particles.size(), 0.3);
     CellLabels labels = carved.labels;
-    EXPECT_EQ(mend_handles(labels, carved.cells, mesh, inspection, inspector, carved.particles, thickness,
-                           disk, carved.limits, carve_labels, [](FrameMesh&) {}),
-              1u);
+    const LabelTrials::Carve carve_labels = carved.carve_labels();
+    const LabelTrials::Fit no_fit = [](FrameMesh&) {};
+    LabelTrials trials(labels, mesh, inspection, inspector, carved.limits, carve_labels, no_fit);
+    EXPECT_EQ(mend_handles(trials, carved.cells, carved.particles, thickness, disk), 1u);
     EXPECT_EQ(euler(mesh), 4);
     EXPECT_EQ(euler(carve_labels(labels)), 4);
     // Now there is nothing to mend.
-    EXPECT_EQ(mend_handles(labels, carved.cells, mesh, inspection, inspector, carved.particles, thickness,
-                           disk, carved.limits, carve_labels, [](FrameMesh&) {}),
-              0u);
+    EXPECT_EQ(mend_handles(trials, carved.cells, carved.particles, thickness, disk), 0u);
+}
+
+/// A ball with a spike of one line of nodes.
+openvdb::FloatGrid::Ptr ball_with_spike() {
+    auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    auto values = grid->getAccessor();
+    for (int x = -9; x <= 16; ++x)
+        for (int y = -9; y <= 9; ++y)
+            for (int z = -9; z <= 9; ++z) {
+                const double spike = std::max({std::hypot(y, z) - 0.45, 2.0 - x, x - 12.2}),
+                             ball = (Vec3(x, y, z) - Vec3(0.2, 0.1, 0.3)).norm() - 5.3;
+                values.setValue({x, y, z}, static_cast<float>(std::clamp(std::min(spike, ball), -3.0, 3.0)));
+            }
+    return grid;
+}
+
+/// Of the ball with its spike cut through: joins specks at this tolerance, then removes what is left.
+void cut_a_spike(double tolerance, std::size_t joined, bool reaches_its_end) {
+    const LevelSet surface(ball_with_spike());
+    Carved carved(surface, tolerance, 0.3);
+    const auto topology = [](const FrameMesh& mesh) {
+        return mesh_topology({mesh.vertices, mesh.carved.triangles, {}, {}});
+    };
+    ASSERT_EQ(topology(carved.mesh()).components, 1u);
+    ASSERT_EQ(topology(carved.mesh()).euler, 2);
+    for (int c = 0; c < static_cast<int>(carved.labels.size()); ++c)
+        if (carved.labels[c] && std::abs(carved.centroid(c).x() - 9.5) < 0.5) carved.labels[c] = 0;
+    FrameMesh mesh = carved.mesh();
+    ASSERT_GT(topology(mesh).components, 1u);
+
+    const CrossingGrid crossings(surface);
+    Inspector inspector(surface, carved.limits, crossings);
+    Inspection inspection = inspector.inspect_both_ways(mesh);
+    inspector.look_between(mesh, inspection);
+    inspector.inspect_topology(mesh, inspection);
+    for (std::size_t t = 0; t < mesh.carved.triangles.size(); ++t) {
+        const double x = mesh.vertices[mesh.carved.triangles[t][0]].x();
+        if (std::abs(x - 9.5) < 1.0) continue;
+        EXPECT_EQ(inspection.topology.speck[t] != 0, x > 9.5);
+    }
+    CellLabels labels = carved.labels;
+    const LabelTrials::Carve carve_labels = carved.carve_labels();
+    const LabelTrials::Fit no_fit = [](FrameMesh&) {};
+    LabelTrials trials(labels, mesh, inspection, inspector, carved.limits, carve_labels, no_fit);
+    EXPECT_EQ(join_specks(trials, carved.cells, carved.particles, surface, carved.limits), joined);
+    remove_specks(mesh, inspection, inspector, carved.limits);
+    EXPECT_EQ(topology(mesh).components, 1u);
+    EXPECT_EQ(topology(mesh).euler, 2);
+    EXPECT_TRUE(topology(mesh).closed() && topology(mesh).manifold());
+    EXPECT_TRUE(inspection.missed.empty());
+    EXPECT_EQ(
+        std::any_of(mesh.vertices.begin(), mesh.vertices.end(), [](const Vec3& p) { return p.x() > 11.9; }),
+        reaches_its_end);
+}
+
+TEST(Specks, AreJoinedWhereSomethingWouldBeMissedWithoutThem) {
+    cut_a_spike(0.5, 1, true);
+}
+
+TEST(Specks, AreRemovedWhereNothingIsMissedWithoutThem) {
+    cut_a_spike(5.0, 0, false);
 }
 
 }  // namespace

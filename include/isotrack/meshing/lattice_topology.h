@@ -20,7 +20,8 @@ struct LatticeTopology {
     std::vector<Vec3> faults;
     /// Diagonals of the surface that the mesh crosses twice or more often: it parts what they join.
     std::vector<Surface::Diagonal> parted;
-    /// Per triangle: it belongs to a component that holds no node on its own. No such thing is in a grid.
+    /// Per triangle: it belongs to a component that volumeToMesh does not have. It holds no node on its own;
+    /// or it is small, and an inside node of it is joined there with one that the rest of the mesh holds.
     std::vector<char> speck;
 };
 

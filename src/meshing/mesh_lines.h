@@ -1,0 +1,55 @@
+// Where the lattice lines in the third direction meet a mesh.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// In layers of one x, ascending there by line and along it.
+class MeshLines {
+public:
+    struct Hit {
+        int y, component;
+        double z;
+    };
+    using Range = std::pair<const Hit*, const Hit*>;
+
+    /// `points` in lattice units; `component` per triangle. Uses TBB inside.
+    MeshLines(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+              const std::vector<int>& component);
+
+    /// The layers from `low_x()` up to, but not including, `end_x()` may hold some.
+    int low_x() const { return low_x_; }
+    int end_x() const { return low_x_ + static_cast<int>(layers_.size()); }
+    bool empty() const { return layers_.empty(); }
+    Range layer(int x) const;
+    Range line(int x, int y) const;
+    /// They are of no more use.
+    void forget_layer(int x) {
+        if (x >= low_x() && x < end_x()) std::vector<Hit>().swap(layers_[x - low_x_]);
+    }
+
+    /// Calls `visit(first, last)` with the pairs of hits of one component on a line, the first with the
+    /// second and so on: it is between them. An odd hit is left out: the line grazes an edge.
+    template <typename Visit>
+    static void for_each_pair(const Range& line, int component, const Visit& visit);
+
+private:
+    int low_x_ = 0;
+    std::vector<std::vector<Hit>> layers_;
+};
+
+template <typename Visit>
+void MeshLines::for_each_pair(const Range& line, int component, const Visit& visit) {
+    const Hit* first = nullptr;
+    for (const Hit* h = line.first; h != line.second; ++h) {
+        if (h->component != component) continue;
+        if (first) visit(*first, *h);
+        first = first ? nullptr : h;
+    }
+}
+
+}  // namespace isotrack

@@ -1,0 +1,209 @@
+#include "tracking/specks.h"
+
+#include <algorithm>
+#include <map>
+#include <queue>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "sampling/compact.h"
+
+namespace isotrack {
+namespace {
+
+constexpr std::size_t kMostCells = 4096;  // of a part, and met on ways from it
+
+/// The inside cells that hang together with one.
+std::set<int> inside_with(int cell, const CellLabels& labels, const Tetrahedra& cells) {
+    std::set<int> result{cell};
+    std::vector<int> stack{cell};
+    while (!stack.empty() && result.size() < kMostCells) {
+        const int c = stack.back();
+        stack.pop_back();
+        for (int k = 0; k < 4; ++k) {
+            const int next = cells.neighbour(c, k);
+            if (labels[next] != 0 && result.insert(next).second) stack.push_back(next);
+        }
+    }
+    return result;
+}
+
+/// The outside cells on the way from a part to any other inside cell on which the largest distance outside is
+/// least, then their number; none if there is no way within `farthest`.
+std::vector<int> way_from(const std::set<int>& part, const CellLabels& labels, const Tetrahedra& cells,
+                          const Particles& particles, Surface::Probe& probe, double farthest) {
+    struct Step {
+        double distance;
+        int steps, cell, from;
+        bool operator>(const Step& o) const {
+            return std::tie(distance, steps, cell, from) > std::tie(o.distance, o.steps, o.cell, o.from);
+        }
+    };
+    std::priority_queue<Step, std::vector<Step>, std::greater<>> open;
+    std::map<int, int> from;  // of the cells that were reached; -1 from the part
+    const auto go_on = [&](int cell, double so_far, int steps) {
+        for (int k = 0; k < 4; ++k) {
+            const int next = cells.neighbour(cell, k);
+            if (labels[next] != 0 || cells.is_infinite(next) || from.count(next) > 0) continue;
+            Vec3 centroid = Vec3::Zero();
+            for (const int v : cells.vertices[next]) centroid += 0.25 * particles.position[v];
+            const double distance = std::max(so_far, probe.value(centroid));
+            if (distance <= farthest) open.push({distance, steps + 1, next, steps == 0 ? -1 : cell});
+        }
+    };
+    for (const int c : part) go_on(c, 0.0, 0);
+    while (!open.empty() && from.size() < kMostCells) {
+        const Step step = open.top();
+        open.pop();
+        if (!from.emplace(step.cell, step.from).second) continue;
+        for (int k = 0; k < 4; ++k) {
+            const int next = cells.neighbour(step.cell, k);
+            if (labels[next] == 0 || part.count(next) > 0) continue;
+            std::vector<int> way;
+            for (int c = step.cell; c >= 0; c = from.at(c)) way.push_back(c);
+            return way;
+        }
+        go_on(step.cell, step.distance, step.steps);
+    }
+    return {};
+}
+
+FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out) {
+    FrameMesh result = mesh;
+    CarvedSurface& carved = result.carved;
+    std::vector<char> keep;
+    for (const char flag : left_out) keep.push_back(!flag);
+    compact(carved.triangles, keep);
+    compact(carved.inside_cell, keep);
+    compact(carved.inside_facet, keep);
+    keep.assign(mesh.vertices.size(), 0);
+    for (const Triangle& t : carved.triangles)
+        for (const int v : t) keep[v] = 1;
+    compact(result.vertices, keep);
+    compact(result.on_surface, keep);
+    compact(carved.particle, keep);
+    const std::vector<int> number = numbers_after(keep);
+    for (Triangle& t : carved.triangles)
+        for (int& v : t) v = number[v];
+    return result;
+}
+
+/// Takes the flags off what hangs together, within flagged triangles, with some of them.
+void spare_components_of(const std::vector<std::size_t>& some, const FrameMesh& mesh,
+                         std::vector<char>& flags) {
+    std::vector<char> spared(mesh.vertices.size(), 0);
+    const auto spare = [&](std::size_t t) {
+        flags[t] = 0;
+        for (const int v : mesh.carved.triangles[t]) spared[v] = 1;
+    };
+    for (const std::size_t t : some) spare(t);
+    for (bool more = !some.empty(); more;) {
+        more = false;
+        for (std::size_t t = 0; t < flags.size(); ++t) {
+            const auto& [i, j, k] = mesh.carved.triangles[t];
+            if (!flags[t] || !(spared[i] || spared[j] || spared[k])) continue;
+            spare(t);
+            more = true;
+        }
+    }
+}
+
+/// Takes the flags off the components with a triangle whose box is within `distance` of one of `places`.
+/// Returns whether there were any.
+bool spare_near(const std::vector<Surface::Crossing>& places, double distance, const FrameMesh& mesh,
+                std::vector<char>& flags) {
+    std::vector<std::size_t> near;
+    for (std::size_t t = 0; t < flags.size(); ++t) {
+        if (!flags[t]) continue;
+        Box box;
+        for (const int v : mesh.carved.triangles[t]) box.extend(mesh.vertices[v]);
+        if (std::any_of(places.begin(), places.end(),
+                        [&](const auto& c) { return box.exteriorDistance(c.point) <= distance; }))
+            near.push_back(t);
+    }
+    spare_components_of(near, mesh, flags);
+    return !near.empty();
+}
+
+/// Flags the triangles of each speck, one speck after the other.
+std::vector<std::vector<char>> each_speck(const FrameMesh& mesh, const std::vector<char>& speck) {
+    std::vector<std::vector<char>> result;
+    std::vector<char> left = speck;
+    for (auto first = left.begin(); (first = std::find(first, left.end(), 1)) != left.end();) {
+        std::vector<char> flags = left;
+        spare_components_of({static_cast<std::size_t>(first - left.begin())}, mesh, left);
+        for (std::size_t t = 0; t < flags.size(); ++t) flags[t] = flags[t] && !left[t];
+        result.push_back(std::move(flags));
+    }
+    return result;
+}
+
+Inspection inspect_without(const std::vector<char>& part, const FrameMesh& mesh, Inspector& inspector,
+                           FrameMesh& rest) {
+    rest = without(mesh, part);
+    Inspection result = inspector.inspect_both_ways(rest);
+    inspector.look_between(rest, result);
+    return result;
+}
+
+}  // namespace
+
+std::size_t join_specks(LabelTrials& trials, const Tetrahedra& cells, const Particles& particles,
+                        const Surface& surface, const SizingLimits& limits) {
+    const auto probe = surface.probe();
+    const auto is_needed = [&](const std::vector<char>& speck) {
+        FrameMesh rest;
+        const Inspection after = inspect_without(speck, trials.mesh(), trials.inspector(), rest);
+        trials.inspector().inspect_both_ways(trials.mesh());
+        return after.missed.size() > trials.inspection().missed.size();
+    };
+    const auto join = [&](const std::set<int>& part) {
+        const MeshTopology now = topology_of(trials.mesh());
+        CellLabels changed = trials.labels();
+        const auto way = way_from(part, changed, cells, particles, *probe, limits.tolerance);
+        for (const int c : way) changed[c] = 1;
+        return !way.empty() && trials.try_labels(std::move(changed), true, [&](const MeshTopology& then) {
+            return then.components == now.components - 1 && then.euler == now.euler - 2;
+        });
+    };
+    std::size_t joined = 0;
+    std::set<int> looked_at;  // inside cells
+    for (bool more = true; more;) {
+        more = false;
+        const std::vector<char> specks = trials.inspection().topology.speck;
+        for (const std::vector<char>& speck : each_speck(trials.mesh(), specks)) {
+            const auto t = std::find(speck.begin(), speck.end(), 1) - speck.begin();
+            const int inside = trials.mesh().carved.inside_cell[t];
+            if (inside == CarvedSurface::kNoCell || looked_at.count(inside) > 0) continue;
+            const std::set<int> part = inside_with(inside, trials.labels(), cells);
+            looked_at.insert(part.begin(), part.end());
+            if (part.size() < kMostCells && is_needed(speck) && join(part)) {
+                ++joined;
+                more = true;  // the triangles are others now
+                break;
+            }
+        }
+    }
+    return joined;
+}
+
+void remove_specks(FrameMesh& mesh, Inspection& inspection, Inspector& inspector,
+                   const SizingLimits& limits) {
+    std::vector<char> specks = inspection.topology.speck;
+    const auto any = [&] { return std::find(specks.begin(), specks.end(), 1) != specks.end(); };
+    if (!any()) return;
+    while (any()) {
+        FrameMesh rest;
+        Inspection after = inspect_without(specks, mesh, inspector, rest);
+        if (after.missed.size() > inspection.missed.size() &&
+            spare_near(after.missed, limits.tolerance, mesh, specks))
+            continue;
+        mesh = std::move(rest);
+        inspection = std::move(after);
+        return;
+    }
+    inspector.inspect_both_ways(mesh);  // what it saw last may have been another
+}
+
+}  // namespace isotrack
