@@ -1,12 +1,15 @@
 #include "isotrack/sampling/cover.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <numeric>
 #include <optional>
+#include <utility>
+
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
@@ -20,6 +23,7 @@ constexpr double kOffPlane =
 // itself.
 constexpr double kGrazing = 0.01, kHere = 0.1;  // kHere: spacings of the crossings
 constexpr double kRounding = 1e-5;              // of a particle's normal
+constexpr std::size_t kBatch = 128;
 constexpr double kLargestSeed = 5.0;  // spacings of the crossings: above it small features are stepped over
 
 /// A shuffled order that depends on the seed and the count alone [splitmix64].
@@ -67,28 +71,46 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
         mark_all(kReach, &columns);
     }
 
-    std::vector<int> order;
+    std::vector<std::pair<std::uint64_t, int>> order;
     for (std::size_t c = 0; c < grid.size(); ++c)
-        if (!covered[c]) order.push_back(static_cast<int>(c));
-    std::sort(order.begin(), order.end(), [&](int a, int b) {
-        const auto ka = mix(seed ^ mix(a)), kb = mix(seed ^ mix(b));
-        return ka != kb ? ka < kb : a < b;
-    });
-    const auto probe = surface.probe();
-    std::size_t added = 0;
-    for (const int c : order) {
-        if (covered[c]) continue;
-        covered[c] = 1;
+        if (!covered[c]) order.emplace_back(mix(seed ^ mix(c)), static_cast<int>(c));
+    tbb::parallel_sort(order.begin(), order.end());
+    // Seeds are found side by side, a batch at a time; those that another of the batch covers were in vain.
+    struct Seed {
+        Vec3 position, normal;
+        double spacing = 0.0;  // none: there is no surface here
+    };
+    ThreadProbes probes(surface);
+    const auto seed_at = [&](int c, Surface::Probe& probe) -> Seed {
         const Vec3 start = grid[c].point;
-        const auto p = probe->project(start);
-        if (!p || (*p - start).norm() > 1.5 * surface.resolution()) continue;
-        const Vec3 n = probe->normal(*p);
-        if (!(n.squaredNorm() > 0.0)) continue;
-        const double h = std::min(spacing_from_curvature(*probe, *p, n, spacing, limits),
-                                  std::max(kLargestSeed * spacing, limits.min_edge));
-        particles.add(*p, n, h, next_id++);
-        mark(*p, n, kSeedDistance * h);
-        ++added;
+        const auto p = probe.project(start);
+        if (!p || (*p - start).norm() > 1.5 * surface.resolution()) return {};
+        const Vec3 n = probe.normal(*p);
+        if (!(n.squaredNorm() > 0.0)) return {};
+        return {*p, n,
+                std::min(spacing_from_curvature(probe, *p, n, spacing, limits),
+                         std::max(kLargestSeed * spacing, limits.min_edge))};
+    };
+    std::size_t added = 0;
+    std::vector<int> batch;
+    std::vector<Seed> seeds;
+    for (std::size_t next = 0; next < order.size();) {
+        for (batch.clear(); next < order.size() && batch.size() < kBatch; ++next)
+            if (const int c = order[next].second; !covered[c]) batch.push_back(c);
+        seeds.assign(batch.size(), {});
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, batch.size(), 8), [&](const auto& range) {
+            Surface::Probe& probe = probes.local();
+            for (std::size_t i = range.begin(); i < range.end(); ++i) seeds[i] = seed_at(batch[i], probe);
+        });
+        for (std::size_t i = 0; i < batch.size(); ++i) {
+            if (covered[batch[i]]) continue;
+            covered[batch[i]] = 1;
+            const auto& [p, n, h] = seeds[i];
+            if (!(h > 0.0)) continue;
+            particles.add(p, n, h, next_id++);
+            mark(p, n, kSeedDistance * h);
+            ++added;
+        }
     }
     return added;
 }
