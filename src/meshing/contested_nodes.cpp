@@ -3,7 +3,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <numeric>
 #include <tuple>
@@ -17,20 +16,6 @@ namespace isotrack {
 namespace {
 
 using Hit = MeshLines::Hit;
-
-/// Flags the components with a node between two hits of their own on one line; `end` is behind its last hit.
-void flag_holders(const Hit* begin, const Hit* end, std::vector<char>& paired,
-                  std::vector<std::atomic<char>>& holds_node) {
-    paired.assign(static_cast<std::size_t>(end - begin), 0);
-    for (const Hit* a = begin; a != end; ++a) {
-        if (paired[a - begin]) continue;
-        const Hit* b = std::find_if(
-            a + 1, end, [&](const Hit& h) { return h.component == a->component && !paired[&h - begin]; });
-        if (b == end) continue;  // an odd hit: the line grazes an edge
-        paired[b - begin] = 1;
-        if (std::floor(b->z) >= a->z) holds_node[a->component].store(1, std::memory_order_relaxed);
-    }
-}
 
 /// A layer of lines and what crosses them, mesh and surface in turn by z.
 struct Layer {
@@ -86,28 +71,14 @@ bool is_contested(const Layer& layer, const Layer::Line& line, std::size_t pair,
     return false;
 }
 
-std::vector<char> holders(const MeshLines& lines, int components) {
-    std::vector<std::atomic<char>> holds_node(components);  // flagged by several threads
-    tbb::parallel_for(lines.low_x(), lines.end_x(), [&](int x) {
-        std::vector<char> paired;
-        auto [line, end] = lines.layer(x);
-        while (line != end) {
-            const Hit* next = std::find_if(line, end, [y = line->y](const Hit& h) { return h.y != y; });
-            flag_holders(line, next, paired, holds_node);
-            line = next;
-        }
-    });
-    return {holds_node.begin(), holds_node.end()};
-}
-
 }  // namespace
 
 Contested contested_nodes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                           const std::vector<int>& component, int components, const LatticeSides& sides) {
-    MeshLines lines(points, triangles, component);
+    MeshLines lines(points, triangles, component, components);
     const Uprights& uprights = sides.uprights();
     Contested result;
-    result.counts = holders(lines, components);
+    result.counts = lines.holds_node();
     for (const int c : torn_components(lines, points, triangles, component, result.counts, sides))
         result.counts[c] = 0;
     if (lines.empty() && uprights.empty()) return result;

@@ -17,9 +17,9 @@ public:
     };
     using Range = std::pair<const Hit*, const Hit*>;
 
-    /// `points` in lattice units; `component` per triangle. Uses TBB inside.
+    /// `points` in lattice units; `component` per triangle, below `components`. Uses TBB inside.
     MeshLines(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-              const std::vector<int>& component);
+              const std::vector<int>& component, int components);
 
     /// The layers from `low_x()` up to, but not including, `end_x()` may hold some.
     int low_x() const { return low_x_; }
@@ -27,6 +27,8 @@ public:
     bool empty() const { return layers_.empty(); }
     Range layer(int x) const;
     Range line(int x, int y) const;
+    /// Per component: there is a node between two hits of it on one line.
+    const std::vector<char>& holds_node() const { return holds_node_; }
     /// They are of no more use.
     void forget_layer(int x) {
         if (x >= low_x() && x < end_x()) std::vector<Hit>().swap(layers_[x - low_x_]);
@@ -40,6 +42,7 @@ public:
 private:
     int low_x_ = 0;
     std::vector<std::vector<Hit>> layers_;
+    std::vector<char> holds_node_;
 };
 
 template <typename Visit>
