@@ -48,9 +48,11 @@ void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
                   std::vector<CrossedEdge>& found) {
     const float* own = leaf.buffer().data();
     const Coord origin = leaf.origin();
-    const auto add = [&](const Coord& from, int axis, float a, float b, bool active) {
+    constexpr int kNotLookedAt = 7;
+    const auto add = [&](const Coord& from, int axis, float a, float b, bool active, int saddles) {
         const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
-        found.push_back({from, fraction, static_cast<std::int8_t>(axis), a < 0.0f, !active});
+        found.push_back({from, fraction, static_cast<std::int8_t>(axis), a < 0.0f, !active,
+                         static_cast<std::uint8_t>(saddles)});
     };
     const auto is_on = [](const Leaf& of, int offset) {
         return of.isValueOn(static_cast<openvdb::Index>(offset));
@@ -62,11 +64,23 @@ void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
         if (x + 1 < kDim) next = layer(own, 0, x + 1);
         const Bits crossed[3] = {here ^ next, (here ^ here >> kDim) & kNotLastY,
                                  (here ^ here >> 1) & kNotLastZ};
+        // Of the faces that an edge spans with one along a further axis; those that leave the leaf may be
+        // any.
+        const auto saddles = [](Bits edges, Bits opposite, Bits beside, Bits within) {
+            return ~within | (edges & opposite & beside);
+        };
+        const Bits along_y[3] = {saddles(crossed[0], crossed[0] >> kDim, here ^ here >> kDim, kNotLastY), 0,
+                                 0};
+        const Bits along_z[3] = {
+            saddles(crossed[0], crossed[0] >> 1, here ^ here >> 1, kNotLastZ),
+            saddles(here ^ here >> kDim, (here ^ here >> kDim) >> 1, here ^ here >> 1, kNotLastY & kNotLastZ),
+            0};
         for (int axis = 0; axis < 3; ++axis)
             for_each_bit(crossed[axis], [&](int bit) {
                 const int offset = kDim * kDim * x + bit, beyond = offset + kStride[axis];
                 add(origin + Leaf::offsetToLocalCoord(offset), axis, own[offset], own[beyond],
-                    is_on(leaf, offset) && is_on(leaf, beyond));
+                    is_on(leaf, offset) && is_on(leaf, beyond),
+                    static_cast<int>((along_y[axis] >> bit & 1) << 1 | (along_z[axis] >> bit & 1) << 2));
             });
     }
     // Across the leaf's faces: upwards always, downwards only where no leaf sees the edge from below.
@@ -83,7 +97,7 @@ void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
                 Coord from = origin + Leaf::offsetToLocalCoord(offset);
                 if (!up) from[axis] -= 1;
                 add(from, axis, up ? own[offset] : tile, up ? tile : own[offset],
-                    active && is_on(leaf, offset));
+                    active && is_on(leaf, offset), kNotLookedAt);
             });
         };
         if (const Leaf* above = accessor.probeConstLeaf(origin + step)) {
@@ -91,7 +105,7 @@ void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
             for_each_bit(layer(own, axis, kDim - 1) ^ layer(other, axis, 0), [&](int i) {
                 const int offset = offset_in(axis, kDim - 1, i), beyond = offset_in(axis, 0, i);
                 add(origin + Leaf::offsetToLocalCoord(offset), axis, own[offset], other[beyond],
-                    is_on(leaf, offset) && is_on(*above, beyond));
+                    is_on(leaf, offset) && is_on(*above, beyond), kNotLookedAt);
             });
         } else {
             cross_into_tile(true);

@@ -18,6 +18,9 @@ struct CrossedEdge {
     std::int8_t axis;
     bool outward;    ///< `from` is the end inside.
     bool at_border;  ///< One end is an inactive voxel.
+    /// A bit for each axis above its own: the face that it spans with one step along that axis may have its
+    /// two inside nodes across a diagonal. Of faces within a leaf it is known, of others not looked at.
+    std::uint8_t saddles;
 
     Vec3 index() const {
         Vec3 p(from.x(), from.y(), from.z());
@@ -40,8 +43,8 @@ struct CrossedEdges {
 /// has voxels at its surface.
 CrossedEdges find_crossed_edges(const openvdb::FloatTree& tree);
 
-/// Indices of some that stand for all: in each cube of `cube` voxels of a leaf, along the axis that most of its
-/// edges follow, one that goes out and one that goes in. `cube`: 1, 2, 4 or 8.
+/// Indices of some that stand for all: in each cube of `cube` voxels of a leaf, along the axis that most of
+/// its edges follow, one that goes out and one that goes in. `cube`: 1, 2, 4 or 8.
 std::vector<std::size_t> thin_out(const CrossedEdges& crossed, int cube);
 
 }  // namespace isotrack

@@ -562,8 +562,9 @@ std::vector<Surface::Diagonal> LevelSet::diagonals() const {
         return [this, nodes = NodeValues(impl_->grid->constTree())](const CrossedEdge& edge,
                                                                     std::vector<Diagonal>& found) mutable {
             for (int other = edge.axis + 1; other < 3; ++other)
-                if (const auto diagonal = diagonal_beyond(edge, other, nodes, impl_->map))
-                    found.push_back(*diagonal);
+                if ((edge.saddles >> other & 1) != 0)
+                    if (const auto diagonal = diagonal_beyond(edge, other, nodes, impl_->map))
+                        found.push_back(*diagonal);
         };
     });
 }

@@ -3,9 +3,12 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
+#include <array>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <random>
+#include <set>
 #include <vector>
 
 #include "isotrack/meshing/lattice_topology.h"
@@ -93,6 +96,31 @@ TEST(Joining, DiagonalsDoNotCrossTheSurface) {
     }
     EXPECT_GT(inside, 50u);
     EXPECT_GT(outside, 50u);
+}
+
+TEST(Joining, KnowsEveryFaceWithTwoInsideNodesAcrossADiagonal) {
+    // Nodes over several leaves of the grid, which has others beyond them.
+    constexpr int kNodes = 18;
+    const auto grid = random_grid(3, kNodes, 0.4);
+    const auto reader = grid->getConstAccessor();
+    const auto is_inside = [&](const Coord& c) { return reader.getValue(c) < 0.0f; };
+    std::set<std::array<int, 3>> centres, found;  // of the faces, doubled
+    for (auto c = openvdb::CoordBBox(Coord(-2), Coord(kNodes + 3)).begin(); c; ++c)
+        for (int out = 0; out < 3; ++out) {
+            Coord u(0), w(0);
+            u[(out + 1) % 3] = w[(out + 2) % 3] = 1;
+            const bool side = is_inside(*c);
+            if (is_inside(*c + u + w) == side && is_inside(*c + u) != side && is_inside(*c + w) != side)
+                centres.insert(
+                    {2 * (*c)[0] + u[0] + w[0], 2 * (*c)[1] + u[1] + w[1], 2 * (*c)[2] + u[2] + w[2]});
+        }
+    for (const Surface::Diagonal& d : LevelSet(grid).diagonals()) {
+        const Vec3 sum = d.from + d.to;
+        found.insert({static_cast<int>(std::lround(sum.x())), static_cast<int>(std::lround(sum.y())),
+                      static_cast<int>(std::lround(sum.z()))});
+    }
+    EXPECT_GT(centres.size(), 1000u);
+    EXPECT_EQ(found, centres);
 }
 
 TEST(Joining, IsContinuousAndKeepsNodesAndEdges) {
