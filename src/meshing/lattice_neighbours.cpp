@@ -1,6 +1,8 @@
 #include "meshing/lattice_neighbours.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdlib>
 
 #include "surface/ambiguous_faces.h"
@@ -46,9 +48,7 @@ std::uint32_t spread(std::uint32_t seed, std::uint32_t set, const std::uint32_t*
     return found;
 }
 
-}  // namespace
-
-bool is_simple(std::uint32_t inside) {
+bool find_is_simple(std::uint32_t inside) {
     static const Neighbourhoods around;
     inside &= around.all;
     const std::uint32_t outside = ~inside & around.no_corner, reached = outside & around.at_face;
@@ -56,6 +56,20 @@ bool is_simple(std::uint32_t inside) {
     const auto lowest = [](std::uint32_t set) { return set & (~set + 1u); };
     if (spread(lowest(inside), inside, around.touching) != inside) return false;
     return (reached & ~spread(lowest(reached), outside, around.beside)) == 0;
+}
+
+}  // namespace
+
+bool is_simple(std::uint32_t inside) {
+    // Most nodes lie at smooth surfaces and have one of few neighbourhoods: what was found lately is kept,
+    // each at one place, with the answer in the lowest bit.
+    constexpr std::size_t kPlaces = 1 << 12;
+    thread_local std::array<std::uint32_t, kPlaces> found{};
+    const std::uint32_t others = inside & ~(1u << bit_of(0, 0, 0)), known = others << 1;
+    if (others == 0) return false;
+    std::uint32_t& place = found[(others * 2654435761u) >> 20];
+    if ((place & ~1u) != known) place = known | (find_is_simple(others) ? 1u : 0u);
+    return (place & 1u) != 0;
 }
 
 bool is_joined(std::uint32_t inside, const Node& to) {

@@ -103,6 +103,7 @@ std::vector<Around> look_around(const std::vector<Node>& wrong, const LatticeSid
         for (std::size_t w = range.begin(); w < range.end(); ++w) {
             const bool same_line =
                 w > range.begin() && wrong[w][0] == wrong[w - 1][0] && wrong[w][1] == wrong[w - 1][1];
+            const bool is_next = same_line && wrong[w][2] == wrong[w - 1][2] + 1;
             for (int x = -1; x <= 1; ++x)
                 for (int y = -1; y <= 1; ++y) {
                     const Node low = {wrong[w][0] + x, wrong[w][1] + y, wrong[w][2] - 1};
@@ -115,6 +116,13 @@ std::vector<Around> look_around(const std::vector<Node>& wrong, const LatticeSid
                     while (line.at != wrong.end() && *line.at < low) ++line.at;
                     auto at = line.at;
                     for (int z = -1; z <= 1; ++z) {
+                        const int bit = bit_of(x, y, z);
+                        if (is_next && z < 1) {  // it was around the one before
+                            around[w].inside |= around[w - 1].inside >> 1 & 1u << bit;
+                            around[w].wrong[bit] = around[w - 1].wrong[bit + 1];
+                            at += around[w].wrong[bit] >= 0;
+                            continue;
+                        }
                         const Node m = {low[0], low[1], wrong[w][2] + z};
                         const bool is_wrong = at != wrong.end() && !(m < *at);
                         const auto below = std::count_if(line.crossed.first, line.crossed.second,
@@ -122,9 +130,8 @@ std::vector<Around> look_around(const std::vector<Node>& wrong, const LatticeSid
                         const bool inside = line.known
                                                 ? below % 2 == 1
                                                 : own_probe.value(lattice * Vec3(m[0], m[1], m[2])) < 0.0;
-                        if (inside != is_wrong) around[w].inside |= 1u << bit_of(x, y, z);
-                        around[w].wrong[bit_of(x, y, z)] =
-                            is_wrong ? static_cast<int>(at - wrong.begin()) : -1;
+                        if (inside != is_wrong) around[w].inside |= 1u << bit;
+                        around[w].wrong[bit] = is_wrong ? static_cast<int>(at - wrong.begin()) : -1;
                         at += is_wrong;
                     }
                 }
@@ -196,6 +203,12 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
             if (const int other = around[w].wrong[bit]; other >= 0)
                 visit(static_cast<std::size_t>(other), bit);
     };
+    // Most are held at once; in what order does not matter.
+    std::vector<char> held(wrong.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, wrong.size(), 1024), [&](const auto& range) {
+        for (std::size_t w = range.begin(); w < range.end(); ++w) held[w] = lost[w] && is_held(w);
+    });
+    for (std::size_t w = 0; w < wrong.size(); ++w) lost[w] = lost[w] && !held[w];
     visit_until_rest(wrong.size(), [&](std::size_t w, const auto& look_again) {
         if (!lost[w] || !is_held(w)) return;
         lost[w] = 0;
