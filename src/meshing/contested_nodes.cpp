@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -32,12 +31,12 @@ struct Layer {
     std::vector<Line> lines;
 };
 
-Layer merge(const MeshLines::Range& hits, const std::vector<char>& counts, const Uprights::Range& uprights) {
+Layer merge(const MeshLines::Range& hits, const std::vector<char>& is_part, const Uprights::Range& uprights) {
     Layer layer;
     auto [h, last_hit] = hits;
     auto [u, last_upright] = uprights;
     const auto skip = [&, last_hit = last_hit](const Hit* hit) {
-        while (hit != last_hit && !counts[hit->component]) ++hit;
+        while (hit != last_hit && !is_part[hit->component]) ++hit;
         return hit;
     };
     for (h = skip(h); h != last_hit || u != last_upright;) {
@@ -78,9 +77,9 @@ Contested contested_nodes(const std::vector<Vec3>& points, const std::vector<Tri
     MeshLines lines(points, triangles, component, components);
     const Uprights& uprights = sides.uprights();
     Contested result;
-    result.counts = lines.holds_node();
-    for (const int c : torn_components(lines, points, triangles, component, result.counts, sides))
-        result.counts[c] = 0;
+    result.is_part = lines.holds_node();
+    for (const int c : torn_components(lines, points, triangles, component, result.is_part, sides))
+        result.is_part[c] = 0;
     if (lines.empty() && uprights.empty()) return result;
     const int low_x = lines.empty()      ? uprights.low_x()
                       : uprights.empty() ? lines.low_x()
@@ -90,7 +89,7 @@ Contested contested_nodes(const std::vector<Vec3>& points, const std::vector<Tri
 
     std::vector<Layer> layers(static_cast<std::size_t>(end_x - low_x));
     tbb::parallel_for(low_x, end_x, [&](int x) {
-        layers[x - low_x] = merge(lines.layer(x), result.counts, uprights.layer(x));
+        layers[x - low_x] = merge(lines.layer(x), result.is_part, uprights.layer(x));
         lines.forget_layer(x);
     });
 

@@ -18,7 +18,7 @@ struct Contested {
     std::vector<Node> nodes;
     /// Per component: it holds a node on its own and is not torn off others. The mesh is taken to consist of
     /// those that do and are not.
-    std::vector<char> counts;
+    std::vector<char> is_part;
 };
 
 /// `points` in lattice units; `component` per triangle, below `components`.

@@ -38,7 +38,7 @@ std::vector<int> component_of_triangles(std::size_t vertices, const std::vector<
 }
 
 /// Whether a segment from p to q crosses a triangle, by the signs of volumes: an edge that the segment
-/// touches counts for one of its triangles.
+/// touches is_part for one of its triangles.
 bool crosses(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
     const Vec3 d = q - p, normal = (b - a).cross(c - a);
     if ((normal.dot(p - a) < 0.0) == (normal.dot(q - a) < 0.0)) return false;
@@ -170,9 +170,9 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
     for (const Vec3& p : points) in_lattice.push_back(to_lattice * p);
     int components = 0;
     const std::vector<int> component = component_of_triangles(points.size(), triangles, components);
-    const auto [wrong, counts] = contested_nodes(in_lattice, triangles, component, components, sides);
+    const auto [wrong, is_part] = contested_nodes(in_lattice, triangles, component, components, sides);
     LatticeTopology result;
-    for (const int c : component) result.speck.push_back(!counts[c]);
+    for (const int c : component) result.speck.push_back(!is_part[c]);
 
     std::vector<Around> around = look_around(wrong, sides);
     // Inside nodes that hang together, none of them inside the mesh, are a component that is lost even where

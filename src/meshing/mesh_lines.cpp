@@ -106,21 +106,6 @@ std::vector<MeshLines::Hit> hits_in_layer(int x, const TrianglesByLayer& over,
     return hits;
 }
 
-/// Flags the components with a node between two hits of their own on one line; `end` is behind its last hit.
-void flag_holders(const MeshLines::Hit* begin, const MeshLines::Hit* end, std::vector<char>& paired,
-                  std::vector<std::atomic<char>>& holds_node) {
-    paired.assign(static_cast<std::size_t>(end - begin), 0);
-    for (const MeshLines::Hit* a = begin; a != end; ++a) {
-        if (paired[a - begin]) continue;
-        const MeshLines::Hit* b = std::find_if(a + 1, end, [&](const MeshLines::Hit& h) {
-            return h.component == a->component && !paired[&h - begin];
-        });
-        if (b == end) continue;  // an odd hit: the line grazes an edge
-        paired[b - begin] = 1;
-        if (std::floor(b->z) >= a->z) holds_node[a->component].store(1, std::memory_order_relaxed);
-    }
-}
-
 }  // namespace
 
 MeshLines::MeshLines(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
@@ -132,11 +117,12 @@ MeshLines::MeshLines(const std::vector<Vec3>& points, const std::vector<Triangle
     tbb::parallel_for(std::size_t{0}, layers_.size(), [&](std::size_t l) {
         std::vector<Hit>& hits = layers_[l];
         hits = hits_in_layer(low_x_ + static_cast<int>(l), over, points, triangles, component);
-        std::vector<char> paired;
         const Hit *line = hits.data(), *end = line + hits.size();
         while (line != end) {
             const Hit* next = std::find_if(line, end, [&](const Hit& h) { return h.y != line->y; });
-            flag_holders(line, next, paired, holds_node);
+            for_each_pair({line, next}, [&](const Hit& in, const Hit& out) {
+                if (std::floor(out.z) >= in.z) holds_node[in.component].store(1, std::memory_order_relaxed);
+            });
             line = next;
         }
     });

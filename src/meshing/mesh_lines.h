@@ -1,6 +1,7 @@
 // Where the lattice lines in the third direction meet a mesh.
 #pragma once
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -34,10 +35,10 @@ public:
         if (x >= low_x() && x < end_x()) std::vector<Hit>().swap(layers_[x - low_x_]);
     }
 
-    /// Calls `visit(first, last)` with the pairs of hits of one component on a line, the first with the
-    /// second and so on: it is between them. An odd hit is left out: the line grazes an edge.
+    /// Calls `visit(first, last)` with pairs of hits of one component on a line, of each the first with the
+    /// second and so on: it is between them. The last of an odd number is left out: the line grazes an edge.
     template <typename Visit>
-    static void for_each_pair(const Range& line, int component, const Visit& visit);
+    static void for_each_pair(const Range& line, const Visit& visit);
 
 private:
     int low_x_ = 0;
@@ -46,12 +47,18 @@ private:
 };
 
 template <typename Visit>
-void MeshLines::for_each_pair(const Range& line, int component, const Visit& visit) {
-    const Hit* first = nullptr;
-    for (const Hit* h = line.first; h != line.second; ++h) {
-        if (h->component != component) continue;
-        if (first) visit(*first, *h);
-        first = first ? nullptr : h;
+void MeshLines::for_each_pair(const Range& line, const Visit& visit) {
+    const auto [begin, end] = line;
+    thread_local std::vector<char> paired;  // there are many lines
+    paired.assign(static_cast<std::size_t>(end - begin), 0);
+    for (const Hit* a = begin; a != end; ++a) {
+        if (paired[a - begin]) continue;
+        const Hit* b = std::find_if(a + 1, end, [&, begin = begin](const Hit& h) {
+            return h.component == a->component && !paired[&h - begin];
+        });
+        if (b == end) continue;
+        paired[b - begin] = 1;
+        visit(*a, *b);
     }
 }
 

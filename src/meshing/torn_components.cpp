@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <utility>
 
@@ -21,23 +22,23 @@ struct Piece {
 /// The small components, those with the fewest nodes first.
 std::vector<Piece> small_pieces(const MeshLines& lines, const std::vector<Vec3>& points,
                                 const std::vector<Triangle>& triangles, const std::vector<int>& component,
-                                const std::vector<char>& looked_at) {
-    std::vector<Box> boxes(looked_at.size());
+                                const std::vector<char>& is_part) {
+    std::vector<Box> boxes(is_part.size());
     for (std::size_t t = 0; t < triangles.size(); ++t)
         for (const int v : triangles[t]) boxes[component[t]].extend(points[v]);
     std::vector<Piece> result;
     for (std::size_t c = 0; c < boxes.size(); ++c) {
-        if (!looked_at[c] || !(boxes[c].sizes().maxCoeff() <= kSmall)) continue;
+        if (!is_part[c] || !(boxes[c].sizes().maxCoeff() <= kSmall)) continue;
         Piece piece{static_cast<int>(c), {}};
         const Vec3 from = boxes[c].min().array().floor(), to = boxes[c].max().array().ceil();
         for (int x = static_cast<int>(from.x()); x <= to.x(); ++x)
             for (int y = static_cast<int>(from.y()); y <= to.y(); ++y)
-                MeshLines::for_each_pair(lines.line(x, y), piece.component,
-                                         [&](const auto& in, const auto& out) {
-                                             for (int z = static_cast<int>(std::ceil(in.z)); z <= out.z; ++z)
-                                                 piece.nodes.push_back({x, y, z});
-                                         });
-        result.push_back(std::move(piece));
+                MeshLines::for_each_pair(lines.line(x, y), [&](const auto& in, const auto& out) {
+                    if (in.component != piece.component) return;
+                    for (int z = static_cast<int>(std::ceil(in.z)); z <= out.z; ++z)
+                        piece.nodes.push_back({x, y, z});
+                });
+        if (!piece.nodes.empty()) result.push_back(std::move(piece));
     }
     std::stable_sort(result.begin(), result.end(),
                      [](const Piece& a, const Piece& b) { return a.nodes.size() < b.nodes.size(); });
@@ -48,10 +49,10 @@ std::vector<Piece> small_pieces(const MeshLines& lines, const std::vector<Vec3>&
 
 std::vector<int> torn_components(const MeshLines& lines, const std::vector<Vec3>& points,
                                  const std::vector<Triangle>& triangles, const std::vector<int>& component,
-                                 const std::vector<char>& looked_at, const LatticeSides& sides) {
+                                 const std::vector<char>& is_part, const LatticeSides& sides) {
     std::vector<int> torn;
-    if (std::count(looked_at.begin(), looked_at.end(), 1) < 2) return torn;
-    std::vector<char> rest = looked_at;
+    if (std::count(is_part.begin(), is_part.end(), 1) < 2) return torn;
+    std::vector<char> rest = is_part;
     const Eigen::Affine3d lattice = sides.surface().lattice();
     const auto probe = sides.surface().probe();
     const auto is_inside = [&](const Node& n) {
@@ -85,6 +86,8 @@ std::vector<int> torn_components(const MeshLines& lines, const std::vector<Vec3>
         });
     };
     const auto hangs_on_rest = [&](const Piece& piece) {
+        // Within the rest, as a void is, it is not torn off it.
+        if (is_of_rest(piece.nodes.front(), piece.component)) return false;
         std::vector<Node> hanging;
         std::copy_if(piece.nodes.begin(), piece.nodes.end(), std::back_inserter(hanging), is_inside);
         const std::size_t most = hanging.size() + kMostBetween;
@@ -99,7 +102,7 @@ std::vector<int> torn_components(const MeshLines& lines, const std::vector<Vec3>
                 return true;
         return false;
     };
-    for (const Piece& piece : small_pieces(lines, points, triangles, component, looked_at)) {
+    for (const Piece& piece : small_pieces(lines, points, triangles, component, is_part)) {
         if (!hangs_on_rest(piece)) continue;
         torn.push_back(piece.component);
         rest[piece.component] = 0;

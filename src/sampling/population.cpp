@@ -12,6 +12,7 @@
 
 namespace isotrack {
 
+constexpr int kTaken = -2;
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kEmpty =
     0.8;  // of the spacing: nearest neighbour of a birth; its triangle may be none of the DT any more
@@ -152,6 +153,7 @@ std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
     constexpr double kShrink = 0.6;
     constexpr int kAround = 6;
     constexpr double kGoldenAngle = 2.399963;
+    constexpr double kNoSpacing = 1e-30;
     const std::size_t before = particles_.size();
     if (shortages.empty() || before >= most_) return 0;
     first_of_call_ = static_cast<int>(before);
@@ -166,17 +168,21 @@ std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
         surrounded[there] = 1;
         const Vec3 p = particles_.position[there], a = particles_.normal[there].unitOrthogonal(),
                    b = particles_.normal[there].cross(a);
-        const std::size_t so_far = particles_.size();
-        // On what is smaller than the ring there may be no place for any of it.
-        while (particles_.size() == so_far) {
+        // Where there is no place for any of the ring, because those that are there are too near, as on a
+        // body smaller than the ring, it becomes smaller still.
+        for (bool again = true; again;) {
             const double h = kShrink * std::min(wanted, particles_.spacing[there]);
-            if (h < std::max(min_spacing_, s.least)) break;
+            if (!(h >= std::max({min_spacing_, s.least, kNoSpacing}))) break;
             particles_.spacing[there] = h;
-            const double turn = kGoldenAngle * static_cast<double>(particles_.size());  // rings do not line up
+            const std::size_t so_far = particles_.size();
+            bool taken = false;
+            const double turn = kGoldenAngle * static_cast<double>(so_far);  // rings do not line up
             for (int k = 0; k < kAround; ++k) {
                 const double angle = turn + 2.0 * kPi * k / kAround;
-                add_or_nearest(p + h * (std::cos(angle) * a + std::sin(angle) * b), h);
+                const int nearest = add_or_nearest(p + h * (std::cos(angle) * a + std::sin(angle) * b), h);
+                taken = taken || nearest == kTaken;
             }
+            again = !taken && particles_.size() == so_far;
         }
     }
     return particles_.size() - before;
@@ -204,7 +210,7 @@ int Densifier::add_or_nearest(const Vec3& place, double h) {
         nearest = i;
     });
     const double distance = std::sqrt(least);
-    if (taken) return -1;
+    if (taken) return kTaken;
     if (nearest >= 0 && distance < std::min(apart, kApart * particles_.spacing[nearest])) return nearest;
     grid_.insert(p, static_cast<int>(in_grid_++));
     const double spacing = distance < apart ? distance / kApart : std::max(distance, h);

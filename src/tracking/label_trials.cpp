@@ -9,14 +9,13 @@
 namespace isotrack {
 namespace {
 
-bool reaches_as_much(const Inspection& after, const Inspection& before, bool joins, double tolerance) {
+bool is_as_good(const Inspection& after, const Inspection& before, bool joins, double tolerance) {
     const auto farthest = [](const Inspection& inspection) {
         double result = 0.0;
         for (const TriangleError& error : *inspection.errors) result = std::max(result, error.largest);
         return result;
     };
-    return after.missed.size() <= before.missed.size() && after.lost_crossings <= before.lost_crossings &&
-           (joins || (after.topology.faults.size() <= before.topology.faults.size() &&
+    return (joins || (after.topology.faults.size() <= before.topology.faults.size() &&
                       after.topology.parted.size() <= before.topology.parted.size())) &&
            farthest(after) <= std::max(kCertified * tolerance, farthest(before));
 }
@@ -40,7 +39,8 @@ bool LabelTrials::try_labels(CellLabels changed, bool joins,
     Inspection after = inspector_.inspect_both_ways(other);
     inspector_.look_between(other, after);
     inspector_.inspect_topology(other, after);
-    const bool good = reaches_as_much(after, inspection_, joins, limits_.tolerance);
+    const bool good = is_as_good(after, inspection_, joins, limits_.tolerance) &&
+                      inspector_.newly_missed(after, mesh_.vertices, mesh_.carved.triangles).empty();
     if (good) {
         labels_ = std::move(changed);
         mesh_ = std::move(other);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <utility>
 
 #include "isotrack/meshing/convection.h"
 #include "isotrack/meshing/mesh_topology.h"
@@ -19,14 +20,14 @@ public:
     using Fit = std::function<void(FrameMesh&)>;
 
     LabelTrials(CellLabels& labels, FrameMesh& mesh, Inspection& inspection, Inspector& inspector,
-                const SizingLimits& limits, const Carve& carve, const Fit& fit)
+                const SizingLimits& limits, Carve carve, Fit fit)
         : labels_(labels),
           mesh_(mesh),
           inspection_(inspection),
           inspector_(inspector),
           limits_(limits),
-          carve_(carve),
-          fit_(fit) {}
+          carve_(std::move(carve)),
+          fit_(std::move(fit)) {}
 
     const CellLabels& labels() const { return labels_; }
     const FrameMesh& mesh() const { return mesh_; }
@@ -34,10 +35,10 @@ public:
     /// It saw the mesh last.
     Inspector& inspector() { return inspector_; }
 
-    /// Takes other labels if their mesh has a topology that `is_wanted`, if no more crossings are missed, no
-    /// more nodes on a wrong side and no more diagonals parted than before, and if the largest error is
-    /// within the tolerance or no larger. `joins`: only parts that were apart are joined; nodes between them
-    /// may be on the wrong side. Returns whether it did.
+    /// Takes other labels if their mesh has a topology that `is_wanted`, if it misses nothing that the mesh
+    /// does not, if its largest error is within the tolerance or no larger, and if no more nodes are on a
+    /// wrong side and no more diagonals parted; not the last when it `joins` parts that were apart, between
+    /// which nodes may stay outside. Returns whether it did.
     bool try_labels(CellLabels changed, bool joins,
                     const std::function<bool(const MeshTopology&)>& is_wanted);
 
@@ -47,8 +48,8 @@ private:
     Inspection& inspection_;
     Inspector& inspector_;
     const SizingLimits& limits_;
-    const Carve& carve_;
-    const Fit& fit_;
+    Carve carve_;
+    Fit fit_;
 };
 
 /// Of the triangles whose flag is set; of all of them.

@@ -12,6 +12,7 @@
 namespace isotrack {
 namespace {
 
+constexpr std::size_t kMostSpecks = 12;   // that are joined; each takes some meshes
 constexpr std::size_t kMostCells = 4096;  // of a part, and met on ways from it
 
 /// The inside cells that hang together with one.
@@ -126,11 +127,12 @@ bool spare_near(const std::vector<Surface::Crossing>& places, double distance, c
     return !near.empty();
 }
 
-/// Flags the triangles of each speck, one speck after the other.
+/// Flags the triangles of one speck after the other, as many as are looked at.
 std::vector<std::vector<char>> each_speck(const FrameMesh& mesh, const std::vector<char>& speck) {
     std::vector<std::vector<char>> result;
     std::vector<char> left = speck;
-    for (auto first = left.begin(); (first = std::find(first, left.end(), 1)) != left.end();) {
+    for (auto first = left.begin();
+         (first = std::find(first, left.end(), 1)) != left.end() && result.size() < kMostSpecks;) {
         std::vector<char> flags = left;
         spare_components_of({static_cast<std::size_t>(first - left.begin())}, mesh, left);
         for (std::size_t t = 0; t < flags.size(); ++t) flags[t] = flags[t] && !left[t];
@@ -139,12 +141,22 @@ std::vector<std::vector<char>> each_speck(const FrameMesh& mesh, const std::vect
     return result;
 }
 
-Inspection inspect_without(const std::vector<char>& part, const FrameMesh& mesh, Inspector& inspector,
-                           FrameMesh& rest) {
-    rest = without(mesh, part);
-    Inspection result = inspector.inspect_both_ways(rest);
-    inspector.look_between(rest, result);
-    return result;
+struct Rest {
+    FrameMesh mesh;
+    Inspection inspection;
+    std::vector<Surface::Crossing> newly_missed;
+};
+
+Rest without_and_inspected(const std::vector<char>& specks, const FrameMesh& mesh, Inspector& inspector) {
+    Rest rest{without(mesh, specks), {}, {}};
+    rest.inspection = inspector.inspect_both_ways(rest.mesh);
+    inspector.look_between(rest.mesh, rest.inspection);
+    rest.newly_missed = inspector.newly_missed(rest.inspection, mesh.vertices, mesh.carved.triangles);
+    return rest;
+}
+
+bool any(const std::vector<char>& flags) {
+    return std::find(flags.begin(), flags.end(), 1) != flags.end();
 }
 
 }  // namespace
@@ -152,11 +164,15 @@ Inspection inspect_without(const std::vector<char>& part, const FrameMesh& mesh,
 std::size_t join_specks(LabelTrials& trials, const Tetrahedra& cells, const Particles& particles,
                         const Surface& surface, const SizingLimits& limits) {
     const auto probe = surface.probe();
-    const auto is_needed = [&](const std::vector<char>& speck) {
-        FrameMesh rest;
-        const Inspection after = inspect_without(speck, trials.mesh(), trials.inspector(), rest);
+    // Those that something is near to which is missed without all of them.
+    const auto needed = [&] {
+        std::vector<char> specks = trials.inspection().topology.speck, removed = specks;
+        if (!any(specks)) return specks;
+        const Rest rest = without_and_inspected(specks, trials.mesh(), trials.inspector());
+        spare_near(rest.newly_missed, limits.tolerance, trials.mesh(), removed);
         trials.inspector().inspect_both_ways(trials.mesh());
-        return after.missed.size() > trials.inspection().missed.size();
+        for (std::size_t t = 0; t < specks.size(); ++t) specks[t] = specks[t] && !removed[t];
+        return specks;
     };
     const auto join = [&](const std::set<int>& part) {
         const MeshTopology now = topology_of(trials.mesh());
@@ -168,21 +184,19 @@ std::size_t join_specks(LabelTrials& trials, const Tetrahedra& cells, const Part
         });
     };
     std::size_t joined = 0;
-    std::set<int> looked_at;  // inside cells
+    std::set<int> refused;  // inside cells
     for (bool more = true; more;) {
         more = false;
-        const std::vector<char> specks = trials.inspection().topology.speck;
-        for (const std::vector<char>& speck : each_speck(trials.mesh(), specks)) {
+        for (const std::vector<char>& speck : each_speck(trials.mesh(), needed())) {
             const auto t = std::find(speck.begin(), speck.end(), 1) - speck.begin();
             const int inside = trials.mesh().carved.inside_cell[t];
-            if (inside == CarvedSurface::kNoCell || looked_at.count(inside) > 0) continue;
+            if (inside == CarvedSurface::kNoCell || refused.count(inside) > 0) continue;
             const std::set<int> part = inside_with(inside, trials.labels(), cells);
-            looked_at.insert(part.begin(), part.end());
-            if (part.size() < kMostCells && is_needed(speck) && join(part)) {
-                ++joined;
-                more = true;  // the triangles are others now
+            if (part.size() < kMostCells && join(part)) {
+                more = ++joined < kMostSpecks;  // the triangles are others now
                 break;
             }
+            refused.insert(part.begin(), part.end());
         }
     }
     return joined;
@@ -191,19 +205,15 @@ std::size_t join_specks(LabelTrials& trials, const Tetrahedra& cells, const Part
 void remove_specks(FrameMesh& mesh, Inspection& inspection, Inspector& inspector,
                    const SizingLimits& limits) {
     std::vector<char> specks = inspection.topology.speck;
-    const auto any = [&] { return std::find(specks.begin(), specks.end(), 1) != specks.end(); };
-    if (!any()) return;
-    while (any()) {
-        FrameMesh rest;
-        Inspection after = inspect_without(specks, mesh, inspector, rest);
-        if (after.missed.size() > inspection.missed.size() &&
-            spare_near(after.missed, limits.tolerance, mesh, specks))
-            continue;
-        mesh = std::move(rest);
-        inspection = std::move(after);
+    if (!any(specks)) return;
+    while (any(specks)) {
+        Rest rest = without_and_inspected(specks, mesh, inspector);
+        if (spare_near(rest.newly_missed, limits.tolerance, mesh, specks)) continue;
+        mesh = std::move(rest.mesh);
+        inspection = std::move(rest.inspection);
         return;
     }
-    inspector.inspect_both_ways(mesh);  // what it saw last may have been another
+    inspector.inspect_both_ways(mesh);  // what it saw last was another
 }
 
 }  // namespace isotrack

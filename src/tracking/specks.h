@@ -6,14 +6,15 @@
 
 namespace isotrack {
 
-/// Joins specks that are needed, because without them more would be missed, with the rest of the mesh: by
-/// cells on the way to its next inside cell, that way on which the outside ones go least far outside, and no
-/// farther than the tolerance. That is wanted where it makes one component of two. Returns how many were
-/// joined.
+/// Joins specks that are needed, because they are near to what would be missed without them, with another
+/// part of the mesh: by cells on the way to its next inside cell on which the outside ones go least far
+/// outside, and no farther than the tolerance. That is wanted where it makes one component of two. Looks at
+/// a few specks per call. Returns how many were joined.
 std::size_t join_specks(LabelTrials& trials, const Tetrahedra& cells, const Particles& particles,
                         const Surface& surface, const SizingLimits& limits);
 
-/// Takes specks off the mesh just inspected, but for those that are needed.
+/// Takes specks off a mesh, but for those that are needed. `inspection`: with what lies between crossings and
+/// the topology, which it is without afterwards.
 void remove_specks(FrameMesh& mesh, Inspection& inspection, Inspector& inspector, const SizingLimits& limits);
 
 }  // namespace isotrack

@@ -29,7 +29,7 @@ for data in "$@"; do
         continue
     fi
     # Means over the frames, but the worst of them for errors and angles and the sum for pairs.
-    LC_ALL=C awk -F, -v shape="${name//[.#]*/}" -v missed="$work/missed" '
+    LC_ALL=C awk -F, -v shape="${name//[.#]*/}" -v missed="$work/missed" -v cold="$([ "$measure" -ne 1 ] || echo "$work/cold")" '
         NR == 1 { for (i = 1; i <= NF; i++) column[$i] = i; next }
         {
             m = $2; n[m]++
@@ -57,6 +57,8 @@ for data in "$@"; do
                    pair("%.1f", least[a], least[b]), pair("%.1f", p1[a], p1[b]), pair("%d", pairs[a], pairs[b]),
                    topology(a), topology(b), pair("%.0f", seconds[a] / seconds[v], seconds[b] / seconds[v]),
                    ratio(seconds[a], sa), ratio(seconds[b], sb)
+            # Vertices are half the triangles, theirs as well.
+            if (cold != "" && sa && overs[a]) printf "%s %.1f\n", shape, over[a] / overs[a] * sa / seconds[a] >>cold
             for (k = 1; k <= 2; k++) {
                 m = k == 1 ? a : b; list = ""
                 miss(error[m] > 0.5, sprintf("error %.3f", error[m]))
@@ -77,6 +79,10 @@ done
 echo
 echo "Measured on $(nproc) cores, $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)."
 echo "Wanted: error at most 0.5 voxel; smallest angle at least 15 degrees, 1 % quantile at least 30; components and Euler number of volumeToMesh; no crossing pairs; with --fit at most 0.85 of make_surface_mesh's triangles at the same error, and an RMS error at most 1.15 of decimation's at the same count."
+if [ -s "$work/cold" ]; then
+    LC_ALL=C awk '{ low = NR == 1 || $2 < low ? $2 : low; high = NR == 1 || $2 > high ? $2 : high }
+        END { printf "Vertices per second of shapes met cold: %.1f to %.1f times those of make_surface_mesh at the same error; wanted: 5.\n", low, high }' "$work/cold"
+fi
 if [ -s "$work/missed" ]; then
     echo "Missed:"
     cat "$work/missed"

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "isotrack/compare/baselines.h"
@@ -167,6 +168,19 @@ TEST(LatticeTopology, CallsASmallPartThatIsTornOffASpeck) {
     for (int x = -7; x <= 7; ++x) row.emplace_back(x, 0, 0);
     EXPECT_EQ(specks_of({body_around({-7, 0, 0}, {-1, 0, 0}), body_around({1, 0, 0}, {7, 0, 0})},
                         level_set_of(row)),
+              (std::vector<char>{0, 0}));
+}
+
+TEST(LatticeTopology, TakesNoVoidForTornOff) {
+    // A ball with a void of three nodes, of which the mesh has four.
+    std::vector<openvdb::Coord> inside;
+    for (auto c = openvdb::CoordBBox(openvdb::Coord(-5), openvdb::Coord(5)).begin(); c; ++c) {
+        const bool is_void = (*c)[0] >= 0 && (*c)[0] <= 2 && (*c)[1] == 0 && (*c)[2] == 0;
+        if ((*c).asVec3d().length() < 5.4 && !is_void) inside.push_back(*c);
+    }
+    TriangleMesh hole = body_around({0, 0, 0}, {3, 0, 0});
+    for (Triangle& t : hole.triangles) std::swap(t[1], t[2]);
+    EXPECT_EQ(specks_of({icosphere(4, {0, 0, 0}, 5.4), hole}, level_set_of(inside)),
               (std::vector<char>{0, 0}));
 }
 

@@ -21,7 +21,8 @@ struct LatticeTopology {
     /// Diagonals of the surface that the mesh crosses twice or more often: it parts what they join.
     std::vector<Surface::Diagonal> parted;
     /// Per triangle: it belongs to a component that volumeToMesh does not have. It holds no node on its own;
-    /// or it is small, and an inside node of it is joined there with one that the rest of the mesh holds.
+    /// or it is no more than four voxels large, and an inside node of it is joined there with one that the
+    /// rest holds.
     std::vector<char> speck;
 };
 

@@ -51,7 +51,7 @@ public:
     /// way. A particle that was there before and is nearer is surrounded instead: its spacing becomes 0.6 of
     /// the smaller of its own and the wanted one, down to `min_spacing` and `least`, and six more are added
     /// around it at that distance, so that repeated calls get denser; where there is no place for any, as on
-    /// what is smaller than the ring, it becomes smaller still. Where there is room for more than the
+    /// what is smaller than the ring, that becomes smaller still. Where there is room for more than the
     /// wanted spacing a particle takes the distance to the nearest for its own (up to ten times the wanted
     /// one and eight resolutions), and no other of the same call is added within 0.7 of that: it is seen
     /// first what the one has mended. Returns how many were added: 0 means that nothing more can be done.
@@ -59,7 +59,7 @@ public:
 
 private:
     /// Adds a particle at the projection of `place` and returns -1, or the one that is already there; neither
-    /// where one of this call mends enough.
+    /// where one of this call mends enough (-2).
     int add_or_nearest(const Vec3& place, double h);
 
     Particles& particles_;
