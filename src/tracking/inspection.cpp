@@ -18,7 +18,7 @@ constexpr double kMany = 0.3;        // of the triangles: when more change all d
 constexpr double kFaultReach = 1.5;  // resolutions
 constexpr double kMissedSpacing = 0.75;                    // resolutions
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
-constexpr double kLeastDoubtful = 0.003;  // resolutions: denser than that nothing near a fault was mended
+constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
 
 struct Corners {
     Triangle particle;
