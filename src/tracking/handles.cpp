@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "meshing/small_handles.h"
+#include "tracking/cell_centroid.h"
 
 namespace isotrack {
 namespace {
@@ -41,8 +42,7 @@ std::vector<std::pair<double, int>> cells_between(const Vec3& place, const Tetra
     for (int c = 0; c < static_cast<int>(cells.size()); ++c) {
         if (cells.is_infinite(c)) continue;
         const auto& v = cells.vertices[c];
-        Vec3 centroid = Vec3::Zero();
-        for (const int i : v) centroid += 0.25 * particles.position[i];
+        const Vec3 centroid = centroid_of(c, cells, particles);
         if ((centroid - place).squaredNorm() > reach * reach) continue;
         const bool one_sheet = std::all_of(v.begin(), v.end(), [&](int i) {
             return std::all_of(v.begin(), v.end(),

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "isotrack/meshing/certify.h"
+#include "tracking/cell_centroid.h"
 #include "tracking/failing.h"
 
 namespace isotrack {
@@ -27,9 +28,7 @@ std::size_t relabel(CellLabels& labels, const Tetrahedra& cells, const FrameMesh
         const bool outside = probe->value(error.where) > 0.0;
         const int wrong = outside ? inner : cells.neighbour(inner, mesh.carved.inside_facet[t]);
         if (cells.is_infinite(wrong) || labels[wrong] != static_cast<char>(outside)) continue;
-        Vec3 centroid = Vec3::Zero();
-        for (const int v : cells.vertices[wrong]) centroid += 0.25 * particles.position[v];
-        const double value = probe->value(centroid);
+        const double value = probe->value(centroid_of(wrong, cells, particles));
         if ((outside ? value : -value) < -kUnclear * limits.tolerance) continue;
         labels[wrong] = static_cast<char>(!outside);
         ++changed;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "sampling/compact.h"
+#include "tracking/cell_centroid.h"
 
 namespace isotrack {
 namespace {
@@ -47,9 +48,7 @@ std::vector<int> way_from(const std::set<int>& part, const CellLabels& labels, c
         for (int k = 0; k < 4; ++k) {
             const int next = cells.neighbour(cell, k);
             if (labels[next] != 0 || cells.is_infinite(next) || from.count(next) > 0) continue;
-            Vec3 centroid = Vec3::Zero();
-            for (const int v : cells.vertices[next]) centroid += 0.25 * particles.position[v];
-            const double distance = std::max(so_far, probe.value(centroid));
+            const double distance = std::max(so_far, probe.value(centroid_of(next, cells, particles)));
             if (distance <= farthest) open.push({distance, steps + 1, next, steps == 0 ? -1 : cell});
         }
     };

@@ -260,6 +260,26 @@ TEST_P(RefitOfABox, TakesBackWhatItMustNot) {
 
 INSTANTIATE_TEST_SUITE_P(Tolerances, RefitOfABox, ::testing::Values(0.02, 0.05, 0.2));
 
+/// A mesh, its inspection with all that there is to look at, and trials of other labels.
+struct Inspected {
+    CrossingGrid crossings;
+    Inspector inspector;
+    Inspection inspection;
+    CellLabels labels;
+    LabelTrials trials;
+
+    Inspected(Carved& carved, FrameMesh& mesh)
+        : crossings(carved.surface),
+          inspector(carved.surface, carved.limits, crossings),
+          inspection(inspector.inspect_both_ways(mesh)),
+          labels(carved.labels),
+          trials(labels, mesh, inspection, inspector, carved.limits, carved.carve_labels(),
+                 [](FrameMesh&) {}) {
+        inspector.look_between(mesh, inspection);
+        inspector.inspect_topology(mesh, inspection);
+    }
+};
+
 /// A disk of one layer of lattice nodes, which are inside by little: about a third of a voxel thick. Beside
 /// it a ball, so that the values inside are known for distances.
 openvdb::FloatGrid::Ptr thin_disk_and_ball() {
@@ -290,21 +310,13 @@ TEST(Handles, FillsAHoleInAThinSheet) {
     FrameMesh mesh = carved.mesh();
     ASSERT_EQ(euler(mesh), 2);
 
-    const CrossingGrid crossings(disk);
-    Inspector inspector(disk, carved.limits, crossings);
-    Inspection inspection = inspector.inspect_both_ways(mesh);
-    inspector.look_between(mesh, inspection);
-    inspector.inspect_topology(mesh, inspection);
+    Inspected now(carved, mesh);
     const std::vector<double> thickness(carved.particles.size(), 0.3);
-    CellLabels labels = carved.labels;
-    const LabelTrials::Carve carve_labels = carved.carve_labels();
-    const LabelTrials::Fit no_fit = [](FrameMesh&) {};
-    LabelTrials trials(labels, mesh, inspection, inspector, carved.limits, carve_labels, no_fit);
-    EXPECT_EQ(mend_handles(trials, carved.cells, carved.particles, thickness, disk), 1u);
+    EXPECT_EQ(mend_handles(now.trials, carved.cells, carved.particles, thickness, disk), 1u);
     EXPECT_EQ(euler(mesh), 4);
-    EXPECT_EQ(euler(carve_labels(labels)), 4);
+    EXPECT_EQ(euler(carved.carve_labels()(now.labels)), 4);
     // Now there is nothing to mend.
-    EXPECT_EQ(mend_handles(trials, carved.cells, carved.particles, thickness, disk), 0u);
+    EXPECT_EQ(mend_handles(now.trials, carved.cells, carved.particles, thickness, disk), 0u);
 }
 
 /// A ball with a spike of one line of nodes.
@@ -338,26 +350,18 @@ void cut_a_spike(const std::vector<double>& at, double tolerance, std::size_t jo
     FrameMesh mesh = carved.mesh();
     ASSERT_GT(topology(mesh).components, 1u);
 
-    const CrossingGrid crossings(surface);
-    Inspector inspector(surface, carved.limits, crossings);
-    Inspection inspection = inspector.inspect_both_ways(mesh);
-    inspector.look_between(mesh, inspection);
-    inspector.inspect_topology(mesh, inspection);
+    Inspected now(carved, mesh);
     for (std::size_t t = 0; t < mesh.carved.triangles.size(); ++t) {
         const double x = mesh.vertices[mesh.carved.triangles[t][0]].x();
         if (x > 8.5 && x < 10.5) continue;
-        EXPECT_EQ(inspection.topology.speck[t] != 0, x > 9.5);
+        EXPECT_EQ(now.inspection.topology.speck[t] != 0, x > 9.5);
     }
-    CellLabels labels = carved.labels;
-    const LabelTrials::Carve carve_labels = carved.carve_labels();
-    const LabelTrials::Fit no_fit = [](FrameMesh&) {};
-    LabelTrials trials(labels, mesh, inspection, inspector, carved.limits, carve_labels, no_fit);
-    EXPECT_EQ(join_specks(trials, carved.cells, carved.particles, surface, carved.limits), joined);
-    remove_specks(mesh, inspection, inspector, carved.limits);
+    EXPECT_EQ(join_specks(now.trials, carved.cells, carved.particles, surface, carved.limits), joined);
+    remove_specks(mesh, now.inspection, now.inspector, carved.limits);
     EXPECT_EQ(topology(mesh).components, 1u);
     EXPECT_EQ(topology(mesh).euler, 2);
     EXPECT_TRUE(topology(mesh).closed() && topology(mesh).manifold());
-    EXPECT_TRUE(inspection.missed.empty());
+    EXPECT_TRUE(now.inspection.missed.empty());
     EXPECT_EQ(
         std::any_of(mesh.vertices.begin(), mesh.vertices.end(), [](const Vec3& p) { return p.x() > 11.9; }),
         reaches_its_end);
