@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace isotrack {
 namespace {
@@ -134,6 +135,29 @@ double lower_quartile(std::vector<double> spacing) {
     return *quartile;
 }
 
+/// Factors for the error aimed at where its mean square counts.
+class LeastSquares {
+public:
+    LeastSquares(const Particles& particles, const SizingEvidence& evidence, double aim)
+        : wide_(lower_quartile(particles.spacing)) {
+        double known = 0.0, with_error = 0.0;
+        for (const double e : evidence.error) {
+            known += e >= 0.0;
+            with_error += e > kHardlyAny * aim;
+        }
+        if (known > 0.0) everywhere_ = std::clamp(std::pow(with_error / known / kMost, 2.0), kLeast, 1.0);
+    }
+    /// For a particle of this spacing.
+    double operator()(double h) const { return everywhere_ * std::min(1.0, std::sqrt(wide_ / h)); }
+
+private:
+    static constexpr double kHardlyAny = 0.15;  // of the aim
+    static constexpr double kMost = 0.9;        // of the particles have an error on smooth surfaces
+    static constexpr double kLeast = 0.35;
+
+    double wide_, everywhere_ = 1.0;
+};
+
 double bounded(double h, const SizingLimits& limits) {
     return std::clamp(h, limits.min_edge, limits.max_edge);
 }
@@ -171,12 +195,13 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
                     const SizingLimits& limits) {
     const std::size_t n = particles.size();
     if (n == 0) return;
-    const double wide = lower_quartile(particles.spacing);
+    const double same = kShare * limits.tolerance;
+    std::optional<LeastSquares> factor;
+    if (limits.least_squares) factor.emplace(particles, evidence, same);
     std::vector<double> log_k2(n);
     for_each_particle(n, [&](std::size_t i) {
         const double h = particles.spacing[i], e = evidence.error[i];
-        const double aim =
-            kShare * limits.tolerance * std::min(1.0, std::pow(wide / h, limits.wide_exponent));
+        const double aim = factor ? same * (*factor)(h) : same;
         if (e < 0.0)
             log_k2[i] = -2.0 * std::log(h);
         else

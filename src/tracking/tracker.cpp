@@ -63,7 +63,6 @@ constexpr int kMostRelabellings = 4;  // what changes sides might go on changing
 // that; one with holes in its band would take more than it has lattice edges.
 constexpr double kMostPerCrossing = 0.5;
 constexpr std::size_t kMostAnyway = 1000;
-constexpr double kFitWideExponent = 0.5;
 constexpr double kAngleFloor = 2.0;     // details: sharp edges are as round as they make them
 constexpr double kLeastSpacing = 5e-4;  // resolutions: a single node inside may leave no more than that
 
@@ -476,7 +475,7 @@ SizingLimits sizing_limits(const TrackerOptions& options, const Surface& surface
     l.angle_floor = kAngleFloor * detail;
     l.min_edge = options.min_edge.value_or(kLeastEdge * detail);
     l.max_edge = std::max(options.max_edge.value_or(kLargestEdge * detail), l.min_edge);
-    l.wide_exponent = options.fit ? kFitWideExponent : 0.0;
+    l.least_squares = options.fit;
     return l;
 }
 

@@ -223,6 +223,33 @@ TEST(UpdateSpacing, GetsSmallerTheLargerTheError) {
     EXPECT_LT(last, 0.19);
 }
 
+TEST(UpdateSpacing, AimsAtASmallerMeanSquareWhereMostParticlesHaveHardlyAnyError) {
+    const Particles start = settled_on_unit_sphere(400, 0.19);
+    const Adjacency adjacency = adjacency_of(start);
+    SizingLimits limits{};
+    limits.tolerance = 0.01;
+    limits.angle = 1.0;
+    limits.min_edge = 0.01;
+    limits.max_edge = 10.0;
+    // The spacing at the top, with an error above this height and none below.
+    const auto at_top = [&](double height, bool least_squares) {
+        limits.least_squares = least_squares;
+        SizingEvidence evidence;
+        std::size_t top = 0;
+        for (std::size_t i = 0; i < start.size(); ++i) {
+            evidence.error.push_back(start.position[i].z() > height ? 0.7 * limits.tolerance : 0.0);
+            if (start.position[i].z() > start.position[top].z()) top = i;
+        }
+        evidence.thickness.assign(start.size(), std::numeric_limits<double>::infinity());
+        Particles particles = start;
+        update_spacing(particles, adjacency, evidence, limits);
+        return particles.spacing[top];
+    };
+    EXPECT_EQ(at_top(-2.0, true), at_top(-2.0, false));
+    EXPECT_EQ(at_top(0.2, false), at_top(-2.0, false));
+    EXPECT_LT(at_top(0.2, true), 0.85 * at_top(0.2, false));
+}
+
 TEST(UpdateSpacing, KeepsBelowTheAngleAndTheThickness) {
     Particles particles = settled_on_unit_sphere(400, 0.19);
     const Adjacency adjacency = adjacency_of(particles);

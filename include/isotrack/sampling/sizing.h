@@ -16,10 +16,10 @@ struct SizingLimits {
     double min_edge, max_edge;  ///< The spacing stays between these.
     double angle_floor =
         0.0;  ///< The angle alone asks for no spacing below this: at a sharp edge it would never be met.
-    /// 0: the same error is aimed at everywhere, which takes the fewest particles. a > 0: where the spacing h
-    /// is above the lower quartile h_0 of all, (h_0 / h)^a of it, which spends more on flat parts and lowers
-    /// the mean square: 1 would be best for that alone.
-    double wide_exponent = 0.0;
+    /// Whether the mean square counts beside the number of particles: then a smaller error is aimed at where
+    /// particles are far apart, and everywhere if most particles have hardly any error and are there only
+    /// because the spacing must not jump from the small ones to large ones. Otherwise the same everywhere.
+    bool least_squares = false;
     double thinning = 0.5;  ///< Least factor of 1/h^2 in one update: near 1 a population thins out slowly.
 };
 
