@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <numeric>
 
 #include "delaunay/circumcentre.h"
 #include "surface/thread_probes.h"
@@ -195,19 +194,24 @@ double FacingTriangle::squared_distance(const Surface::Crossing& crossing, doubl
     return isotrack::squared_distance(crossing.point, a_, b_, c_);
 }
 
-void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                        const CrossingGrid& grid, const std::vector<int>& some, double cutoff,
-                        std::vector<double>& distances) {
-    if (some.empty()) return;
-    std::vector<char> wanted(grid.size(), 0);
-    const std::unique_ptr<int[]> number(new int[grid.size()]);  // of those among `some`
-    std::vector<LeastSquare> least(some.size());
-    for (std::size_t u = 0; u < some.size(); ++u) {
-        wanted[some[u]] = 1;
-        number[some[u]] = static_cast<int>(u);
+namespace {
+
+/// The distances of those in `some`; of all crossings when it is null.
+void measure_crossings(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                       const CrossingGrid& grid, const std::vector<int>* some, double cutoff,
+                       std::vector<float>& distances) {
+    const std::size_t count = some ? some->size() : grid.size();
+    std::vector<char> wanted(grid.size(), !some);
+    const std::unique_ptr<int[]> number(some ? new int[grid.size()] : nullptr);  // of those among `some`
+    const auto crossing = [&](std::size_t u) { return some ? (*some)[u] : static_cast<int>(u); };
+    const auto place = [&](std::size_t c) { return some ? static_cast<std::size_t>(number[c]) : c; };
+    std::vector<LeastSquare> least(count);
+    for (std::size_t u = 0; some && u < count; ++u) {
+        wanted[(*some)[u]] = 1;
+        number[(*some)[u]] = static_cast<int>(u);
     }
-    const auto for_each_block = [](std::size_t count, const auto& body) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 64), [&](const auto& range) {
+    const auto for_each_block = [](std::size_t size, const auto& body) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size, 64), [&](const auto& range) {
             for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
         });
     };
@@ -216,51 +220,62 @@ void crossing_distances(const std::vector<Vec3>& points, const std::vector<Trian
         return Box((a.cwiseMin(b).cwiseMin(c).array() - reach).matrix(),
                    (a.cwiseMax(b).cwiseMax(c).array() + reach).matrix());
     };
-    // Most triangles are far from all that is wanted when little is.
-    std::vector<char> columns = grid.columns_of(some);
-    std::vector<char> is_near(triangles.size());
-    for_each_block(triangles.size(), [&](std::size_t t) {
-        is_near[t] = grid.meets(box_around(triangles[t], cutoff), columns);
-    });
-    std::vector<Triangle> near;
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        if (is_near[t]) near.push_back(triangles[t]);
-    const auto search = [&](double reach) {
+    const auto search = [&](const std::vector<Triangle>& near, const std::vector<char>* columns,
+                            double reach) {
         for_each_block(near.size(), [&](std::size_t t) {
             const auto& [i, j, k] = near[t];
             const FacingTriangle triangle(points[i], points[j], points[k]);
             const auto measure = [&](std::size_t c) {
                 if (!wanted[c]) return;
-                LeastSquare& found = least[number[c]];
+                LeastSquare& found = least[place(c)];
                 found.take(triangle.squared_distance(grid[c], std::min(reach * reach, found.get())));
             };
-            grid.for_each_in(box_around(near[t], reach), measure, &columns);
+            grid.for_each_in(box_around(near[t], reach), measure, columns);
         });
         std::vector<int> left;
-        for (const int c : some) {
-            wanted[c] = least[number[c]].get() > reach * reach;
-            if (wanted[c]) left.push_back(c);
+        for (std::size_t u = 0; u < count; ++u) {
+            wanted[crossing(u)] = least[u].get() > reach * reach;
+            if (wanted[crossing(u)]) left.push_back(crossing(u));
         }
         return left;
     };
-    // Most are near.
-    constexpr double kNear = 0.4;
-    if (const std::vector<int> left = search(kNear * cutoff); !left.empty()) {
-        columns = grid.columns_of(left);
-        search(cutoff);
+    // Most triangles are far from all that is wanted when little is.
+    std::vector<char> columns;
+    std::vector<Triangle> near;
+    if (some) {
+        columns = grid.columns_of(*some);
+        std::vector<char> is_near(triangles.size());
+        for_each_block(triangles.size(), [&](std::size_t t) {
+            is_near[t] = grid.meets(box_around(triangles[t], cutoff), columns);
+        });
+        for (std::size_t t = 0; t < triangles.size(); ++t)
+            if (is_near[t]) near.push_back(triangles[t]);
     }
-    for (const int c : some)
-        distances[c] =
-            wanted[c] ? std::numeric_limits<double>::infinity() : std::sqrt(least[number[c]].get());
+    const std::vector<Triangle>& searched = some ? near : triangles;
+    // Most crossings are near.
+    constexpr double kNear = 0.4;
+    const std::vector<int> left = search(searched, some ? &columns : nullptr, kNear * cutoff);
+    if (!left.empty()) {
+        columns = grid.columns_of(left);
+        search(searched, &columns, cutoff);
+    }
+    for (std::size_t u = 0; u < count; ++u)
+        distances[crossing(u)] = wanted[crossing(u)] ? std::numeric_limits<float>::infinity()
+                                                     : static_cast<float>(std::sqrt(least[u].get()));
 }
 
-std::vector<double> crossing_distances(const std::vector<Vec3>& points,
-                                       const std::vector<Triangle>& triangles, const CrossingGrid& grid,
-                                       double cutoff) {
-    std::vector<double> distances(grid.size());
-    std::vector<int> all(grid.size());
-    std::iota(all.begin(), all.end(), 0);
-    crossing_distances(points, triangles, grid, all, cutoff, distances);
+}  // namespace
+
+void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                        const CrossingGrid& grid, const std::vector<int>& some, double cutoff,
+                        std::vector<float>& distances) {
+    if (!some.empty()) measure_crossings(points, triangles, grid, &some, cutoff, distances);
+}
+
+std::vector<float> crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                      const CrossingGrid& grid, double cutoff) {
+    std::vector<float> distances(grid.size());
+    measure_crossings(points, triangles, grid, nullptr, cutoff, distances);
     return distances;
 }
 

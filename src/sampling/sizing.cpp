@@ -135,10 +135,10 @@ double lower_quartile(std::vector<double> spacing) {
     return *quartile;
 }
 
-/// Factors for the error aimed at where its mean square counts.
-class LeastSquares {
+/// What the error aimed at is multiplied by where its mean square counts.
+class AimFactor {
 public:
-    LeastSquares(const Particles& particles, const SizingEvidence& evidence, double aim)
+    AimFactor(const Particles& particles, const SizingEvidence& evidence, double aim)
         : wide_(lower_quartile(particles.spacing)) {
         double known = 0.0, with_error = 0.0;
         for (const double e : evidence.error) {
@@ -151,8 +151,9 @@ public:
     double operator()(double h) const { return everywhere_ * std::min(1.0, std::sqrt(wide_ / h)); }
 
 private:
-    static constexpr double kHardlyAny = 0.15;  // of the aim
-    static constexpr double kMost = 0.9;        // of the particles have an error on smooth surfaces
+    // Of the aim before these factors: below it is what triangles of the least factor still have.
+    static constexpr double kHardlyAny = 0.15;
+    static constexpr double kMost = 0.9;  // of the particles have an error on smooth surfaces
     static constexpr double kLeast = 0.35;
 
     double wide_, everywhere_ = 1.0;
@@ -196,8 +197,8 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
     const std::size_t n = particles.size();
     if (n == 0) return;
     const double same = kShare * limits.tolerance;
-    std::optional<LeastSquares> factor;
-    if (limits.least_squares) factor.emplace(particles, evidence, same);
+    std::optional<AimFactor> factor;
+    if (limits.mean_square_counts) factor.emplace(particles, evidence, same);
     std::vector<double> log_k2(n);
     for_each_particle(n, [&](std::size_t i) {
         const double h = particles.spacing[i], e = evidence.error[i];

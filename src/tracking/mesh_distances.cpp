@@ -17,10 +17,10 @@ void MeshDistances::measure(const std::vector<Vec3>& vertices, const std::vector
     }
     // What was nearest to a triangle that went is to be measured again; what is nearer to one that came than
     // to all before is measured now.
-    const double same = 1e-6 * cutoff_;  // rounding
+    const double same = 1e-6 * cutoff_;  // ample for the rounding to floats
     const Survey before = survey(cutoff_);
     const double reach = before.lost > 0 ? cutoff_ : before.farthest;
-    constexpr double kUnknown = -1.0;
+    constexpr float kUnknown = -1.0f;
     const auto for_each_near = [&](const Facet& facet, const auto& body) {
         const auto& [a, b, c] = facet.corner;
         const Vec3 around = Vec3::Constant(reach + same),
@@ -41,9 +41,9 @@ void MeshDistances::measure(const std::vector<Vec3>& vertices, const std::vector
         });
     for (const Facet& facet : changes.came)
         for_each_near(facet, [&](const FacingTriangle& triangle, std::size_t i) {
-            const double limit = std::min(distances_[i], cutoff_),
+            const double limit = std::min<double>(distances_[i], cutoff_),
                          d2 = triangle.squared_distance(points_[i], limit * limit);
-            if (d2 < limit * limit) distances_[i] = std::sqrt(d2);
+            if (d2 < limit * limit) distances_[i] = static_cast<float>(std::sqrt(d2));
         });
     crossing_distances(vertices, triangles, points_, unknown, cutoff_, distances_);
 }
@@ -54,13 +54,14 @@ MeshDistances::Survey MeshDistances::survey(double limit) const {
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
         Survey& block = blocks[b];
         for (std::size_t i = b * kBlock; i < std::min(distances_.size(), (b + 1) * kBlock); ++i) {
-            if (!(distances_[i] <= limit)) block.beyond.push_back(static_cast<int>(i));
-            if (!std::isfinite(distances_[i])) {
+            const double d = distances_[i];
+            if (!(d <= limit)) block.beyond.push_back(static_cast<int>(i));
+            if (!std::isfinite(d)) {
                 ++block.lost;
                 continue;
             }
-            block.farthest = std::max(block.farthest, distances_[i]);
-            block.sum_of_squares += distances_[i] * distances_[i];
+            block.farthest = std::max(block.farthest, d);
+            block.sum_of_squares += d * d;
         }
     });
     Survey result;

@@ -40,7 +40,7 @@ public:
 private:
     const CrossingGrid& points_;
     const double cutoff_;
-    std::vector<double> distances_;  // empty: not measured yet
+    std::vector<float> distances_;  // empty: not measured yet
 };
 
 }  // namespace isotrack

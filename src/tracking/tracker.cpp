@@ -475,7 +475,7 @@ SizingLimits sizing_limits(const TrackerOptions& options, const Surface& surface
     l.angle_floor = kAngleFloor * detail;
     l.min_edge = options.min_edge.value_or(kLeastEdge * detail);
     l.max_edge = std::max(options.max_edge.value_or(kLargestEdge * detail), l.min_edge);
-    l.least_squares = options.fit;
+    l.mean_square_counts = options.fit;
     return l;
 }
 

@@ -206,7 +206,7 @@ void errors(benchmark::State& state, const Scene& s) {
 }
 
 void distances(benchmark::State& state, const Scene& s) {
-    std::vector<double> result;
+    std::vector<float> result;
     for (auto _ : state)
         result =
             crossing_distances(s.mesh.points, s.mesh.triangles, *s.crossings, 1.5 * s.surface->resolution());

@@ -445,11 +445,20 @@ TEST(CrossingDistances, AreExactUpToTheCutoffAndInfiniteBeyond) {
                 ASSERT_TRUE(std::isinf(distances[i])) << least;
                 continue;
             }
-            ASSERT_NEAR(distances[i], least, 1e-9);
+            ASSERT_NEAR(distances[i], least, 0x1p-24 * least + 1e-9);  // a float
             ++finite;
         }
         EXPECT_GT(finite, 0u);
         EXPECT_LT(finite, grid.size());
+
+        std::vector<int> some;
+        std::vector<float> of_some(grid.size(), -1.0f), expected = of_some;
+        for (std::size_t i = 0; i < grid.size(); i += 7) {
+            some.push_back(static_cast<int>(i));
+            expected[i] = distances[i];
+        }
+        crossing_distances(mesh.points, mesh.triangles, grid, some, cutoff, of_some);
+        EXPECT_EQ(of_some, expected);
     }
 }
 

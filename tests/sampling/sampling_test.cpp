@@ -232,8 +232,8 @@ TEST(UpdateSpacing, AimsAtASmallerMeanSquareWhereMostParticlesHaveHardlyAnyError
     limits.min_edge = 0.01;
     limits.max_edge = 10.0;
     // The spacing at the top, with an error above this height and none below.
-    const auto at_top = [&](double height, bool least_squares) {
-        limits.least_squares = least_squares;
+    const auto at_top = [&](double height, bool mean_square_counts) {
+        limits.mean_square_counts = mean_square_counts;
         SizingEvidence evidence;
         std::size_t top = 0;
         for (std::size_t i = 0; i < start.size(); ++i) {
@@ -246,8 +246,36 @@ TEST(UpdateSpacing, AimsAtASmallerMeanSquareWhereMostParticlesHaveHardlyAnyError
         return particles.spacing[top];
     };
     EXPECT_EQ(at_top(-2.0, true), at_top(-2.0, false));
-    EXPECT_EQ(at_top(0.2, false), at_top(-2.0, false));
-    EXPECT_LT(at_top(0.2, true), 0.85 * at_top(0.2, false));
+    EXPECT_EQ(at_top(0.0, false), at_top(-2.0, false));
+    EXPECT_LT(at_top(0.0, true), 0.85 * at_top(0.0, false));
+}
+
+TEST(UpdateSpacing, AimsAtASmallerMeanSquareWhereParticlesAreFarApart) {
+    Particles start = settled_on_unit_sphere(400, 0.19);
+    std::size_t top = 0, bottom = 0;
+    for (std::size_t i = 0; i < start.size(); ++i) {
+        if (start.position[i].z() > 0.0) start.spacing[i] *= 2.0;
+        if (start.position[i].z() > start.position[top].z()) top = i;
+        if (start.position[i].z() < start.position[bottom].z()) bottom = i;
+    }
+    SizingLimits limits{};
+    limits.tolerance = 0.01;
+    limits.angle = 2.0;
+    limits.min_edge = 0.01;
+    limits.max_edge = 10.0;
+    const auto updated = [&](bool mean_square_counts) {
+        limits.mean_square_counts = mean_square_counts;
+        SizingEvidence evidence;
+        evidence.error.assign(start.size(), 0.7 * limits.tolerance);
+        evidence.thickness.assign(start.size(), std::numeric_limits<double>::infinity());
+        Particles particles = start;
+        update_spacing(particles, adjacency_of(start), evidence, limits);
+        return particles.spacing;
+    };
+    const std::vector<double> plain = updated(false), weighed = updated(true);
+    EXPECT_EQ(weighed[bottom], plain[bottom]);
+    // An aim of (1 / 2)^(1/2) for 1/h^2 that is in inverse proportion to it.
+    EXPECT_NEAR(weighed[top], std::pow(0.5, 0.25) * plain[top], 0.02 * plain[top]);
 }
 
 TEST(UpdateSpacing, KeepsBelowTheAngleAndTheThickness) {

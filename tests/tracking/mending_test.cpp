@@ -13,9 +13,12 @@
 #include "isotrack/sampling/cover.h"
 #include "isotrack/surface/level_set.h"
 #include "isotrack/surface/shapes.h"
+#include "support/meshes.h"
 #include "surface/cell_points.h"
+#include "surface/float_precision.h"
 #include "tracking/handles.h"
 #include "tracking/inspection.h"
+#include "tracking/mesh_distances.h"
 #include "tracking/refitted.h"
 #include "tracking/relabelling.h"
 #include "tracking/specks.h"
@@ -256,6 +259,38 @@ TEST_P(RefitOfABox, TakesBackWhatItMustNot) {
     for (const double d : crossing_distances(before.vertices, before.carved.triangles,
                                              CrossingGrid(last.missed, kResolution), GetParam()))
         EXPECT_GT(d, 0.98 * GetParam() - 1e-6);
+}
+
+TEST(MeshDistances, AfterChangesAreThoseMeasuredAnew) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const CrossingGrid grid(*sphere);
+    TriangleMesh mesh = support::icosphere(2, {0, 0, 0}, 1.0);
+    for (Vec3& p : mesh.points) p = to_float_precision(p);
+    const auto corner = [&](int v) { return Eigen::Vector3f(mesh.points[v].cast<float>()); };
+    const auto around = [&](int vertex) {
+        std::vector<Facet> facets;
+        for (const auto& [i, j, k] : mesh.triangles)
+            if (i == vertex || j == vertex || k == vertex)
+                facets.push_back({0, {corner(i), corner(j), corner(k)}});
+        return facets;
+    };
+    for (const double cutoff : {0.05, 1.0})
+        for (const double factor : {0.8, 1.1}) {  // away from crossings, and beyond some that it was near
+            MeshDistances distances(grid, cutoff);
+            distances.measure(mesh.points, mesh.triangles, {});
+            TriangleMesh changed = mesh;
+            changed.points[5] = to_float_precision(factor * mesh.points[5]);
+            FacetChanges changes;
+            changes.went = around(5);
+            std::swap(mesh, changed);
+            changes.came = around(5);
+            distances.measure(mesh.points, mesh.triangles, changes);
+            const auto anew = crossing_distances(mesh.points, mesh.triangles, grid, cutoff);
+            std::swap(mesh, changed);
+            const auto before = crossing_distances(mesh.points, mesh.triangles, grid, cutoff);
+            EXPECT_NE(anew, before);
+            for (std::size_t c = 0; c < grid.size(); ++c) EXPECT_EQ(distances[c], anew[c]) << c;
+        }
 }
 
 INSTANTIATE_TEST_SUITE_P(Tolerances, RefitOfABox, ::testing::Values(0.02, 0.05, 0.2));

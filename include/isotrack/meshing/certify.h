@@ -65,14 +65,14 @@ private:
 };
 
 /// Distance of every lattice crossing of the surface to the nearest triangle that stands for it. In the order
-/// of `grid`, world units. Exact up to `cutoff`; beyond it the entry is infinite.
-std::vector<double> crossing_distances(const std::vector<Vec3>& points,
-                                       const std::vector<Triangle>& triangles, const CrossingGrid& grid,
-                                       double cutoff);
+/// of `grid`, world units. Exact up to `cutoff` but for the rounding to floats (there are many); infinite
+/// beyond.
+std::vector<float> crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                      const CrossingGrid& grid, double cutoff);
 
 /// The same for some crossings alone: their entries of `distances`; the others stay.
 void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                         const CrossingGrid& grid, const std::vector<int>& some, double cutoff,
-                        std::vector<double>& distances);
+                        std::vector<float>& distances);
 
 }  // namespace isotrack
