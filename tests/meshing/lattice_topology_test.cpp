@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <set>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "isotrack/meshing/mesh_topology.h"
 #include "isotrack/surface/level_set.h"
 #include "isotrack/surface/shapes.h"
+#include "meshing/lattice_neighbours.h"
 #include "support/meshes.h"
 
 namespace isotrack {
@@ -304,6 +306,59 @@ TEST(LatticeTopology, HasNoFaultsOnlyWhereTheNodesHaveTheSameTopology) {
     }
     EXPECT_GT(same, 15);
     EXPECT_GT(different, 15);
+}
+
+/// Whether what a cube has in common with those of its neighbours, a part of its surface, is connected and
+/// has no hole: then the cube changes no topology when it comes or goes.
+bool meets_in_a_disc(std::uint32_t inside) {
+    // Faces, edges and corners of the cube by their directions, as those of the neighbours.
+    using Direction = std::array<int, 3>;
+    const auto is_part = [](const Direction& part, const Direction& of) {
+        for (int axis = 0; axis < 3; ++axis)
+            if (of[axis] != 0 && part[axis] != of[axis]) return false;
+        return true;
+    };
+    std::vector<Direction> all, common;
+    for (int x = -1; x <= 1; ++x)
+        for (int y = -1; y <= 1; ++y)
+            for (int z = -1; z <= 1; ++z)
+                if (x != 0 || y != 0 || z != 0) all.push_back({x, y, z});
+    for (const Direction& part : all)
+        if (std::any_of(all.begin(), all.end(), [&](const Direction& n) {
+                return (inside >> bit_of(n[0], n[1], n[2]) & 1u) != 0 && is_part(part, n);
+            }))
+            common.push_back(part);
+    int euler = 0;
+    for (const Direction& part : common) euler += std::count(part.begin(), part.end(), 0) % 2 == 0 ? 1 : -1;
+    if (common.empty() || euler != 1) return false;
+    std::vector<Direction> connected = {common.back()}, left(common.begin(), common.end() - 1);
+    for (std::size_t i = 0; i < connected.size(); ++i) {
+        const Direction from = connected[i];
+        const auto next = std::partition(left.begin(), left.end(), [&](const Direction& part) {
+            return !is_part(part, from) && !is_part(from, part);
+        });
+        connected.insert(connected.end(), next, left.end());
+        left.erase(next, left.end());
+    }
+    return left.empty();
+}
+
+TEST(LatticeNeighbours, AreSimpleWhereTheirCubesMeetInADisc) {
+    std::mt19937 random(1);
+    std::vector<std::uint32_t> neighbourhoods = {0u, (1u << 27) - 1};
+    for (int i = 0; i < 20000; ++i) {
+        std::bernoulli_distribution is_inside(0.1 + 0.8 * (i % 9) / 8.0);
+        std::uint32_t inside = 0;
+        for (int bit = 0; bit < 27; ++bit) inside |= static_cast<std::uint32_t>(is_inside(random)) << bit;
+        neighbourhoods.push_back(inside);
+    }
+    int simple = 0;
+    for (int again = 0; again < 2; ++again)  // what was found is kept
+        for (const std::uint32_t inside : neighbourhoods) {
+            ASSERT_EQ(is_simple(inside), meets_in_a_disc(inside)) << inside;
+            simple += is_simple(inside);
+        }
+    EXPECT_GT(simple, 1000);
 }
 
 }  // namespace

@@ -179,14 +179,24 @@ Particles settled_on_unit_sphere(std::size_t count, double spacing) {
     return particles;
 }
 
+/// The error alone bounds the spacing.
+SizingLimits limits_of_error(double tolerance) {
+    SizingLimits limits{};
+    limits.tolerance = tolerance;
+    limits.angle = 2.0;
+    limits.min_edge = 0.01;
+    limits.max_edge = 10.0;
+    return limits;
+}
+
+SizingEvidence of_errors(const std::vector<double>& error) {
+    return {error, std::vector<double>(error.size(), std::numeric_limits<double>::infinity())};
+}
+
 TEST(UpdateSpacing, GetsSmallerTheLargerTheError) {
     const Particles start = settled_on_unit_sphere(400, 0.19);
     const Adjacency adjacency = adjacency_of(start);
-    SizingLimits limits{};
-    limits.tolerance = 0.01;
-    limits.angle = 1.0;
-    limits.min_edge = 0.01;
-    limits.max_edge = 10.0;
+    SizingLimits limits = limits_of_error(0.01);
     // The actual spacing: the mean distance to neighbours within twice that of the nearest.
     double least_actual = 1e300, most_actual = 0.0;
     for (std::size_t i = 0; i < start.size(); ++i) {
@@ -203,10 +213,7 @@ TEST(UpdateSpacing, GetsSmallerTheLargerTheError) {
     double last = 1e300, no_evidence = 0.0;
     for (const double error : {-1.0, 0.001, 0.004, 0.007, 0.01, 0.014, 0.1}) {
         Particles particles = start;
-        SizingEvidence evidence;
-        evidence.error.assign(particles.size(), error);
-        evidence.thickness.assign(particles.size(), std::numeric_limits<double>::infinity());
-        update_spacing(particles, adjacency, evidence, limits);
+        update_spacing(particles, adjacency, of_errors(std::vector<double>(particles.size(), error)), limits);
         const double h = particles.spacing[0];
         if (error >= 0.0) {  // 1 / h^2 is at least half, at most twice 1 / (wanted x actual)
             EXPECT_GE(h, std::sqrt(0.19 * least_actual / 2.0) - 1e-12) << error;
@@ -226,23 +233,18 @@ TEST(UpdateSpacing, GetsSmallerTheLargerTheError) {
 TEST(UpdateSpacing, AimsAtASmallerMeanSquareWhereMostParticlesHaveHardlyAnyError) {
     const Particles start = settled_on_unit_sphere(400, 0.19);
     const Adjacency adjacency = adjacency_of(start);
-    SizingLimits limits{};
-    limits.tolerance = 0.01;
-    limits.angle = 1.0;
-    limits.min_edge = 0.01;
-    limits.max_edge = 10.0;
+    SizingLimits limits = limits_of_error(0.01);
     // The spacing at the top, with an error above this height and none below.
     const auto at_top = [&](double height, bool mean_square_counts) {
         limits.mean_square_counts = mean_square_counts;
-        SizingEvidence evidence;
+        std::vector<double> error;
         std::size_t top = 0;
         for (std::size_t i = 0; i < start.size(); ++i) {
-            evidence.error.push_back(start.position[i].z() > height ? 0.7 * limits.tolerance : 0.0);
+            error.push_back(start.position[i].z() > height ? 0.7 * limits.tolerance : 0.0);
             if (start.position[i].z() > start.position[top].z()) top = i;
         }
-        evidence.thickness.assign(start.size(), std::numeric_limits<double>::infinity());
         Particles particles = start;
-        update_spacing(particles, adjacency, evidence, limits);
+        update_spacing(particles, adjacency, of_errors(error), limits);
         return particles.spacing[top];
     };
     EXPECT_EQ(at_top(-2.0, true), at_top(-2.0, false));
@@ -258,18 +260,12 @@ TEST(UpdateSpacing, AimsAtASmallerMeanSquareWhereParticlesAreFarApart) {
         if (start.position[i].z() > start.position[top].z()) top = i;
         if (start.position[i].z() < start.position[bottom].z()) bottom = i;
     }
-    SizingLimits limits{};
-    limits.tolerance = 0.01;
-    limits.angle = 2.0;
-    limits.min_edge = 0.01;
-    limits.max_edge = 10.0;
+    SizingLimits limits = limits_of_error(0.01);
     const auto updated = [&](bool mean_square_counts) {
         limits.mean_square_counts = mean_square_counts;
-        SizingEvidence evidence;
-        evidence.error.assign(start.size(), 0.7 * limits.tolerance);
-        evidence.thickness.assign(start.size(), std::numeric_limits<double>::infinity());
         Particles particles = start;
-        update_spacing(particles, adjacency_of(start), evidence, limits);
+        update_spacing(particles, adjacency_of(start),
+                       of_errors(std::vector<double>(start.size(), 0.7 * limits.tolerance)), limits);
         return particles.spacing;
     };
     const std::vector<double> plain = updated(false), weighed = updated(true);
@@ -281,14 +277,9 @@ TEST(UpdateSpacing, AimsAtASmallerMeanSquareWhereParticlesAreFarApart) {
 TEST(UpdateSpacing, KeepsBelowTheAngleAndTheThickness) {
     Particles particles = settled_on_unit_sphere(400, 0.19);
     const Adjacency adjacency = adjacency_of(particles);
-    SizingLimits limits{};
-    limits.tolerance = 1.0;  // says nothing
-    limits.angle = 0.1;      // on the unit sphere the spacing itself
-    limits.min_edge = 0.01;
-    limits.max_edge = 10.0;
-    SizingEvidence evidence;
-    evidence.error.assign(particles.size(), 0.0);
-    evidence.thickness.assign(particles.size(), std::numeric_limits<double>::infinity());
+    SizingLimits limits = limits_of_error(1.0);  // says nothing
+    limits.angle = 0.1;                          // on the unit sphere the spacing itself
+    SizingEvidence evidence = of_errors(std::vector<double>(particles.size(), 0.0));
     Particles by_angle = particles;
     for (int round = 0; round < 10; ++round) update_spacing(by_angle, adjacency, evidence, limits);
     for (const double h : by_angle.spacing) EXPECT_NEAR(h, 0.1, 0.01);
