@@ -17,9 +17,9 @@ struct SizingLimits {
     double angle_floor =
         0.0;  ///< The angle alone asks for no spacing below this: at a sharp edge it would never be met.
     /// Whether the mean square counts beside the number of particles. Then a smaller error is aimed at where
-    /// particles are farther apart than the lower quartile h_0, by (h_0 / h)^(1/2); and, when more than a tenth
-    /// of them have hardly any error, being there only because the spacing must not jump from small to large,
-    /// everywhere: down to 0.35 where about half of them have none.
+    /// particles are farther apart than the lower quartile h_0, by (h_0 / h)^(1/2); and, when more than a
+    /// tenth of them have hardly any error, being there only because the spacing must not jump from small to
+    /// large, everywhere: down to 0.35 where about half of them have none.
     bool mean_square_counts = false;
     double thinning = 0.5;  ///< Least factor of 1/h^2 in one update: near 1 a population thins out slowly.
 };
@@ -40,11 +40,11 @@ double spacing_from_curvature(Surface::Probe& probe, const Vec3& p, const Vec3& 
 /// The paper's k_nd: sqrt(max over neighbours on the same side of (1 - n_i . n_j) / r_ij^2), 1 / world units.
 double normal_deviation(const Particles& particles, const Adjacency& adjacency, std::size_t i);
 
-/// Feeds the measured error back: 1/h^2 becomes error / (share of the tolerance aimed at), at least `thinning` and at
-/// most 2, over the wanted spacing times the actual one, since the error is that of the actual and a
-/// population with a dead zone lags behind what is wanted; then the angle, the thickness and the limits bound
-/// it, and the gradation h_i <= h_j + 0.25 r_ij smooths it. The stretch becomes (kappa_1 / kappa_2)^(1/2), at
-/// most 1.4, from the curvature of the normals around the particle.
+/// Feeds the measured error back: 1/h^2 becomes error / (share of the tolerance aimed at), at least
+/// `thinning` and at most 2, over the wanted spacing times the actual one, since the error is that of the
+/// actual and a population with a dead zone lags behind what is wanted; then the angle, the thickness and the
+/// limits bound it, and the gradation h_i <= h_j + 0.25 r_ij smooths it. The stretch becomes (kappa_1 /
+/// kappa_2)^(1/2), at most 1.4, from the curvature of the normals around the particle.
 void update_spacing(Particles& particles, const Adjacency& adjacency, const SizingEvidence& evidence,
                     const SizingLimits& limits);
 
