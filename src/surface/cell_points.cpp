@@ -71,6 +71,7 @@ public:
     void clear() {
         count_ = 0;
         crossed_.fill(-1);
+        joins_ = 0;
     }
     void add(int low_corner, int axis, bool upward, const Surface::Crossing& crossing) {
         int& at = crossed_[3 * low_corner + axis];
@@ -81,8 +82,10 @@ public:
                                 upward ? high_corner : low_corner};
     }
 
-    /// Crossings are of one part of the surface when the corners inside at them are joined by edges without a
-    /// crossing, and those outside, too.
+    void join(const int* corners) { joined_[joins_++] = {corners[0], corners[1]}; }
+
+    /// Crossings are of one part of the surface when the corners inside at them are joined, and those
+    /// outside, too.
     void add_means(std::vector<Surface::Crossing>& means) const {
         const std::array<int, 8> part = joined_corners();
         std::array<bool, 12> done{};
@@ -107,7 +110,7 @@ public:
     }
 
 private:
-    /// A number for each corner: the same for those that edges without a crossing join.
+    /// A number for each corner: the same for those that edges without a crossing join, or a diagonal.
     std::array<int, 8> joined_corners() const {
         std::array<int, 8> part{0, 1, 2, 3, 4, 5, 6, 7};
         for (bool again = true; again;) {
@@ -119,6 +122,12 @@ private:
                     part[k] = part[l] = std::min(part[k], part[l]);
                     again = true;
                 }
+            for (int j = 0; j < joins_; ++j) {
+                const auto [k, l] = joined_[j];
+                if (part[k] == part[l]) continue;
+                part[k] = part[l] = std::min(part[k], part[l]);
+                again = true;
+            }
         }
         return part;
     }
@@ -131,9 +140,30 @@ private:
     std::array<Crossing, 12> crossings_;
     std::array<int, 24> crossed_;  // by lower corner and axis: which crossing, or -1
     int count_ = 0;
+    std::array<std::array<int, 2>, 6> joined_;  // corners, across diagonals
+    int joins_ = 0;
 };
 
 }  // namespace
+
+CellPoints::CellPoints(const CrossingGrid& crossings, const Eigen::Affine3d& lattice,
+                       const std::vector<Surface::Diagonal>& diagonals)
+    : crossings_(crossings), lattice_(lattice) {
+    const Eigen::Affine3d to_lattice = lattice.inverse();
+    for (const Surface::Diagonal& d : diagonals) {
+        const Vec3 nodes[2] = {(to_lattice * d.from).array().round(), (to_lattice * d.to).array().round()};
+        int across = 0;
+        while (nodes[0][across] != nodes[1][across]) ++across;
+        for (const double step : {0.0, 1.0}) {
+            const Vec3 cell = nodes[0].cwiseMin(nodes[1]) - step * Vec3::Unit(across);
+            Join join{packed(cell), {}};
+            for (int n = 0; n < 2; ++n)
+                join.corners[n] = static_cast<int>((nodes[n] - cell).dot(Vec3(1, 2, 4)));
+            joins_.push_back(join);
+        }
+    }
+    std::sort(joins_.begin(), joins_.end(), [](const Join& a, const Join& b) { return a.cell < b.cell; });
+}
 
 std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) {
     const LatticeEdges edges(lattice_);
@@ -151,6 +181,7 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
                     }
             }
         });
+    for (const Join& join : joins_) wanted.push_back(join.cell);
     tbb::parallel_sort(wanted.begin(), wanted.end());
     wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
     std::vector<std::uint64_t> fresh, all;
@@ -175,6 +206,9 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
                     const int corner = static_cast<int>(from.x() + 2.0 * from.y() + 4.0 * from.z());
                     cell.add(corner, axis, upward, crossing);
                 });
+                auto join = std::lower_bound(joins_.begin(), joins_.end(), fresh[i],
+                                             [](const Join& j, std::uint64_t c) { return j.cell < c; });
+                for (; join != joins_.end() && join->cell == fresh[i]; ++join) cell.join(join->corners);
                 cell.add_means(found);
             }
         });

@@ -10,19 +10,27 @@ namespace isotrack {
 
 class CellPoints {
 public:
-    /// `crossings`: all of `lattice`, none that stands for others. They must outlive it.
-    CellPoints(const CrossingGrid& crossings, const Eigen::Affine3d& lattice)
-        : crossings_(crossings), lattice_(lattice) {}
+    /// `crossings`: all of `lattice`, none that stands for others. They must outlive it. `diagonals`: all of
+    /// the surface.
+    CellPoints(const CrossingGrid& crossings, const Eigen::Affine3d& lattice,
+               const std::vector<Surface::Diagonal>& diagonals);
 
-    /// In the cells around the edges that some crossings are on: for each part of the surface in a cell the
-    /// mean of its crossings, where dual meshing has its vertices. Outward is the direction of the lattice
-    /// that most of them go. Cells given before are left out. In an order that does not depend on the number
-    /// of threads.
+    /// In the cells around the edges that some crossings are on, and in all with an ambiguous face: for each
+    /// part of the surface in a cell the mean of its crossings, where volumeToMesh has its vertices. Outward
+    /// is the direction of the lattice that most of them go. Cells given before are left out. In an order
+    /// that does not depend on the number of threads.
     std::vector<Surface::Crossing> around(const std::vector<int>& some);
 
 private:
+    /// Two corners of a cell that hang together across a diagonal of one of its faces.
+    struct Join {
+        std::uint64_t cell;  // packed
+        int corners[2];
+    };
+
     const CrossingGrid& crossings_;
     const Eigen::Affine3d lattice_;
+    std::vector<Join> joins_;           // by cell
     std::vector<std::uint64_t> given_;  // packed cells, ascending
 };
 

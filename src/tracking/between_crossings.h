@@ -11,13 +11,15 @@ namespace isotrack {
 
 class BetweenCrossings {
 public:
-    /// `crossings`: all of `lattice`, none that stands for others. They must outlive it.
-    BetweenCrossings(const CrossingGrid& crossings, const Eigen::Affine3d& lattice, double tolerance)
-        : crossings_(crossings), tolerance_(tolerance), cells_(crossings, lattice) {}
+    /// `crossings`: all of `lattice`, none that stands for others. They must outlive it. `diagonals`: all of
+    /// the surface.
+    BetweenCrossings(const CrossingGrid& crossings, const Eigen::Affine3d& lattice,
+                     const std::vector<Surface::Diagonal>& diagonals, double tolerance)
+        : crossings_(crossings), tolerance_(tolerance), cells_(crossings, lattice, diagonals) {}
 
-    /// Points of the surface in the cells beside crossings that the mesh only just reaches, and along its
-    /// folds beside nearly all: from a fold what lies between two crossings may be much farther than either.
-    /// What was returned before is left out.
+    /// Points of the surface in the cells beside crossings that the mesh only just reaches, along its folds
+    /// beside nearly all, since from a fold what lies between two crossings may be much farther than either,
+    /// and in all cells with an ambiguous face. What was returned before is left out.
     std::vector<Surface::Crossing> points(const std::vector<Vec3>& vertices,
                                           const std::vector<Triangle>& triangles,
                                           const MeshDistances& at_crossings);

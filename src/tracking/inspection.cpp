@@ -7,7 +7,9 @@
 #include <cmath>
 #include <utility>
 
+#include "sampling/compact.h"
 #include "surface/lattice_scan.h"
+#include "surface/thread_probes.h"
 #include "tracking/failing.h"
 
 namespace isotrack {
@@ -78,10 +80,7 @@ std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector
 }
 
 Inspector::Inspector(const Surface& surface, const SizingLimits& limits, const CrossingGrid& crossings)
-    : surface_(surface),
-      limits_(limits),
-      crossings_(crossings),
-      between_crossings_(crossings, surface.lattice(), limits.tolerance) {
+    : surface_(surface), limits_(limits), crossings_(crossings) {
     distances_.emplace_back(crossings_, cutoff());
     missed_.emplace_back();
 }
@@ -166,9 +165,9 @@ void Inspector::take_missed(std::size_t d, Inspection& result) {
     }
     doubt(in_vain, kVainSpacing, result);
     if (d > 0) {  // they are not among the crossings around them
-        for (const Vec3& place : in_vain)
-            result.doubtful.push_back(
-                {place, kVainSpacing * surface_.resolution(), kLeastDoubtful * surface_.resolution()});
+        for (const int i : survey.beyond)
+            result.doubtful.push_back({distances_[d].points()[i].point, kVainSpacing * surface_.resolution(),
+                                       kLeastDoubtful * surface_.resolution()});
     } else if (const std::size_t found = crossings_.size() - survey.lost; found > 0) {
         result.crossings_mean_square = survey.sum_of_squares / static_cast<double>(found);
     }
@@ -192,11 +191,32 @@ Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     return result;
 }
 
+void Inspector::leave_out_unreachable(std::vector<Surface::Crossing>& points) const {
+    constexpr double kNear = 0.1, kReachable = 0.95;  // tolerances off the surface
+    ThreadProbes probes(surface_);
+    std::vector<char> keep(points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 64), [&](const auto& range) {
+        Surface::Probe& probe = probes.local();
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            const Vec3& p = points[i].point;
+            keep[i] = std::abs(probe.value(p)) < kNear * limits_.tolerance;
+            if (keep[i]) continue;
+            const auto there = probe.project(p);
+            keep[i] = there && (*there - p).norm() < kReachable * limits_.tolerance;
+        }
+    });
+    compact(points, keep);
+}
+
 void Inspector::look_between(const FrameMesh& mesh, Inspection& inspection) {
     // Where some crossings stand for others the cells do not have all of theirs.
     if (crossings_.spacing() >= 2.0 * surface_.resolution()) return;
     const auto& triangles = mesh.carved.triangles;
-    const auto points = between_crossings_.points(mesh.vertices, triangles, distances_.front());
+    prepare_topology();
+    if (!between_crossings_)
+        between_crossings_.emplace(crossings_, surface_.lattice(), sides_->diagonals(), limits_.tolerance);
+    auto points = between_crossings_->points(mesh.vertices, triangles, distances_.front());
+    leave_out_unreachable(points);
     if (points.empty()) return;
     between_.emplace_back(points, surface_.resolution());
     distances_.emplace_back(between_.back(), cutoff()).measure(mesh.vertices, triangles, {});

@@ -29,7 +29,7 @@ struct FrameMesh {
 struct Inspection {
     std::shared_ptr<const std::vector<TriangleError>> errors;  ///< Per triangle; the inspector has them, too.
     /// Farther from the mesh than the tolerance: crossings, and points of the surface between such as are
-    /// nearly so far off or at folds of the mesh.
+    /// nearly so far off, at folds of the mesh, or in cells with an ambiguous face.
     std::vector<Surface::Crossing> missed;
     double farthest_crossing = 0.0;      ///< Of these and those, as far as they were found.
     double crossings_mean_square = 0.0;  ///< Of the crossings that were found.
@@ -80,6 +80,8 @@ private:
     /// not when it was seen last.
     std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
     void take_missed(std::size_t d, Inspection& result);  // by distances_[d]
+    /// Means of crossings may be off the surface, farther than any mesh of it can be from them.
+    void leave_out_unreachable(std::vector<Surface::Crossing>& points) const;
     void forget_distances();
     double cutoff() const;
     /// Adds the lattice crossings near some places to the doubtful ones; `spacing` in resolutions.
@@ -96,7 +98,7 @@ private:
     std::vector<Facet> facets_;                                 // of the last inspection
     std::shared_ptr<const std::vector<TriangleError>> errors_;  // of each
     FacetChanges changes_;                                      // since the inspection before
-    BetweenCrossings between_crossings_;
+    std::optional<BetweenCrossings> between_crossings_;
     std::deque<CrossingGrid> between_;      // points between crossings, as they were found
     std::deque<MeshDistances> distances_;   // to the facets: of the crossings, then of each of between_
     bool measured_ = false;                 // and kept up to date from then on
