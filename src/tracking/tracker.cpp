@@ -50,7 +50,8 @@ struct Pace {
     int sweeps;
 };
 constexpr Pace kAtFirst{{}, 0.3, 7};
-constexpr Pace kFollowing{{0.6, 0.85}, 0.6, 3};  // ids live longer, and so does what certify added last
+// Ids live longer, and so does what certify added last.
+constexpr Pace kFollowing{{0.6, 0.85, 0.08}, 0.6, 3};
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr double kDetail = 2.0;       // tolerances
 constexpr double kDetailOfEdges = 0.25;
@@ -287,7 +288,9 @@ void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const 
         update_spacing(particles, last_mesh.ring, last_mesh.evidence, paced);
     }
     const StageTimer timer(frame.seconds, "relax");
-    auto keep = uncrowded(particles, last_mesh.ring, pace.band);
+    PopulationBand band = pace.band;  // its deaths are those of a frame
+    band.deaths -= static_cast<double>(frame.lost) / static_cast<double>(particles.size() + frame.lost);
+    auto keep = uncrowded(particles, last_mesh.ring, band);
     const std::vector<Triangle> parents =
         fill_sparse(particles, last_mesh.triangles, last_mesh.ring, surface, next_id, pace.band);
     last_mesh.grow(particles.size(), parents);
