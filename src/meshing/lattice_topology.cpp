@@ -140,6 +140,36 @@ std::vector<Around> look_around(const std::vector<Node>& wrong, const LatticeSid
     return around;
 }
 
+/// The flagged nodes, put together where volumeToMesh joins them. World positions. `truth`: the nodes around
+/// each that are inside.
+std::vector<std::vector<Vec3>> lost_components(const std::vector<Node>& wrong, const std::vector<char>& lost,
+                                               const std::vector<Around>& around,
+                                               const std::vector<std::uint32_t>& truth,
+                                               const Eigen::Affine3d& lattice) {
+    std::vector<std::vector<Vec3>> result;
+    std::vector<char> seen(wrong.size(), 0);
+    for (std::size_t first = 0; first < wrong.size(); ++first) {
+        if (!lost[first] || seen[first]) continue;
+        result.emplace_back();
+        std::vector<std::size_t> stack{first};
+        seen[first] = 1;
+        while (!stack.empty()) {
+            const std::size_t w = stack.back();
+            stack.pop_back();
+            result.back().push_back(lattice * Vec3(wrong[w][0], wrong[w][1], wrong[w][2]));
+            for (int bit = 0; bit < 27; ++bit) {
+                const int other = around[w].wrong[bit];
+                if (other < 0 || !lost[other] || seen[other] ||
+                    !is_joined(truth[w], {bit / 9 - 1, bit / 3 % 3 - 1, bit % 3 - 1}))
+                    continue;
+                seen[other] = 1;
+                stack.push_back(static_cast<std::size_t>(other));
+            }
+        }
+    }
+    return result;
+}
+
 /// Visits 0 to `count` - 1 in order, then those that visits ask to look at again, in order, until none is
 /// left.
 template <typename Visit>
@@ -214,6 +244,7 @@ LatticeTopology lattice_topology(const std::vector<Vec3>& points, const std::vec
         lost[w] = 0;
         for_each_wrong_around(w, [&](std::size_t other, int) { look_again(other); });
     });
+    result.lost = lost_components(wrong, lost, around, truth, lattice);
     std::vector<char> put_right(wrong.size(), 0);
     visit_until_rest(wrong.size(), [&](std::size_t w, const auto& look_again) {
         if (put_right[w] || lost[w] || !is_simple(around[w].inside)) return;

@@ -29,6 +29,7 @@
 #include "tracking/inspection.h"
 #include "tracking/label_trials.h"
 #include "tracking/last_mesh.h"
+#include "tracking/lost_drops.h"
 #include "tracking/refinement.h"
 #include "tracking/relabelling.h"
 #include "tracking/specks.h"
@@ -388,6 +389,30 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     const bool refines = !options.fit && options.method == Method::Tolerance &&
                          options.reconstruction == Reconstruction::Guided &&
                          options.delaunay != UpdateStrategy::Rebuild;
+    const auto try_other_labels = [&] {
+        last_mesh.take(mesh.carved, particles, dt->cells());
+        const LabelTrials::Carve carve_labels = [&](CellLabels& of_cells) {
+            return mesh_of(of_cells, surface);
+        };
+        const LabelTrials::Fit fit_other = [&](FrameMesh& other) {
+            if (!options.fit) return;
+            Fitted its_own = fitted;
+            its_own.fit_vertices(other, particles.size(), surface);
+            its_own.undo_crossing(other, particles.size());
+        };
+        const bool guided =
+            options.method == Method::Tolerance && options.reconstruction == Reconstruction::Guided;
+        if (guided) {
+            LabelTrials trials(labels, mesh, inspection, *inspector, l, carve_labels, fit_other);
+            const std::size_t joined = join_specks(trials, dt->cells(), particles, surface, l);
+            if (mend_handles(trials, dt->cells(), particles, last_mesh.evidence.thickness, surface) + joined >
+                0)
+                last_mesh.take(mesh.carved, particles, dt->cells());
+        }
+        const std::vector<std::vector<Vec3>> lost = inspection.topology.lost;
+        remove_specks(mesh, inspection, *inspector, l);
+        if (guided) put_in_drops(lost, mesh, inspection, *inspector, surface);
+    };
     // The topology, which takes longer to look at, is looked at when all else passes, and so is once more
     // what lies between crossings.
     int relabellings = 0;
@@ -424,31 +449,13 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         if (good) {
             if (!between) inspector->look_between(mesh, inspection);
             inspector->inspect_topology(mesh, inspection);
-            if (passes()) break;
+            if (!passes()) continue;
+            try_other_labels();  // which may find more that is missed
+            if (last || inspection.missed.empty() || mend(mesh, inspection, surface, l, *densifier) == 0)
+                break;
         }
     }
     frame.relocated += dt->profile().relocated - relocated;
-    last_mesh.take(mesh.carved, particles, dt->cells());
-    {
-        const StageTimer timer(seconds, "certify");
-        const LabelTrials::Carve carve_labels = [&](CellLabels& of_cells) {
-            return mesh_of(of_cells, surface);
-        };
-        const LabelTrials::Fit fit_other = [&](FrameMesh& other) {
-            if (!options.fit) return;
-            Fitted its_own = fitted;
-            its_own.fit_vertices(other, particles.size(), surface);
-            its_own.undo_crossing(other, particles.size());
-        };
-        if (options.method == Method::Tolerance && options.reconstruction == Reconstruction::Guided) {
-            LabelTrials trials(labels, mesh, inspection, *inspector, l, carve_labels, fit_other);
-            const std::size_t joined = join_specks(trials, dt->cells(), particles, surface, l);
-            if (mend_handles(trials, dt->cells(), particles, last_mesh.evidence.thickness, surface) + joined >
-                0)
-                last_mesh.take(mesh.carved, particles, dt->cells());
-        }
-        remove_specks(mesh, inspection, *inspector, l);
-    }
     inherit_velocities(particle_triangles(mesh.carved), first_new);
 
     std::vector<char> seen(particles.size(), 0);

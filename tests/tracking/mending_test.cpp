@@ -18,6 +18,7 @@
 #include "surface/float_precision.h"
 #include "tracking/handles.h"
 #include "tracking/inspection.h"
+#include "tracking/lost_drops.h"
 #include "tracking/mesh_distances.h"
 #include "tracking/refitted.h"
 #include "tracking/relabelling.h"
@@ -410,6 +411,76 @@ TEST(Specks, AreJoinedWhereSomethingWouldBeMissedWithoutThem) {
 
 TEST(Specks, AreRemovedWhereNothingIsMissedWithoutThem) {
     cut_a_spike({9.5}, 5.0, 0, false);
+}
+
+/// A ball, and beside it nodes that are inside by little: one alone and two in a row.
+openvdb::FloatGrid::Ptr ball_and_single_nodes() {
+    auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    auto values = grid->getAccessor();
+    for (int x = -9; x <= 18; ++x)
+        for (int y = -9; y <= 9; ++y)
+            for (int z = -9; z <= 9; ++z) {
+                const double ball = (Vec3(x, y, z) - Vec3(0.2, 0.1, 0.3)).norm() - 5.3;
+                values.setValue({x, y, z}, static_cast<float>(std::clamp(ball, -3.0, 3.0)));
+            }
+    values.setValue({9, 0, 0}, -0.01f);
+    values.setValue({13, 2, 0}, -0.02f);
+    values.setValue({13, 3, 0}, -0.3f);
+    return grid;
+}
+
+TEST(LostDrops, ArePutInWhereTheMeshHasNothingOfThem) {
+    const LevelSet surface(ball_and_single_nodes());
+    Carved carved(surface, 0.5, 0.5);
+    for (int c = 0; c < static_cast<int>(carved.labels.size()); ++c)
+        if ((carved.centroid(c) - Vec3(0.2, 0.1, 0.3)).norm() > 5.28) carved.labels[c] = 0;
+    FrameMesh mesh = carved.mesh();
+    const auto as_mesh = [&] { return TriangleMesh{mesh.vertices, mesh.carved.triangles, {}, {}}; };
+    const std::size_t components = mesh_topology(as_mesh()).components;
+    const long euler = mesh_topology(as_mesh()).euler;
+    const std::size_t vertices = mesh.vertices.size();
+
+    Inspected now(carved, mesh);
+    const auto lost = now.inspection.topology.lost;
+    ASSERT_EQ(lost.size(), 2u);
+    EXPECT_EQ(lost[0].size() + lost[1].size(), 3u);
+    EXPECT_TRUE(put_in_drops(lost, mesh, now.inspection, now.inspector, surface));
+    const MeshTopology then = mesh_topology(as_mesh());
+    EXPECT_EQ(then.components, components + 2);
+    EXPECT_EQ(then.euler, euler + 4);
+    EXPECT_TRUE(then.closed() && then.oriented() && then.manifold());
+    EXPECT_TRUE(self_intersections(as_mesh()).empty());
+    EXPECT_EQ(now.inspection.errors->size(), mesh.carved.triangles.size());
+    EXPECT_EQ(mesh.on_surface.size(), mesh.vertices.size());
+    EXPECT_EQ(mesh.carved.particle.size(), mesh.vertices.size());
+    for (std::size_t v = vertices; v < mesh.vertices.size(); ++v) {
+        EXPECT_EQ(mesh.carved.particle[v], -1);
+        EXPECT_LT(std::abs(surface.probe()->value(mesh.vertices[v])), 0.2);
+    }
+    now.inspector.inspect_topology(mesh, now.inspection);
+    EXPECT_TRUE(now.inspection.topology.lost.empty());
+    EXPECT_FALSE(put_in_drops({}, mesh, now.inspection, now.inspector, surface));
+}
+
+TEST(LostDrops, AreLeftOutWhereTheyWouldCrossTheMesh) {
+    const LevelSet surface(ball_and_single_nodes());
+    Carved carved(surface, 0.5, 0.5);
+    FrameMesh mesh = carved.mesh();
+    Inspected now(carved, mesh);
+    // Through a vertex of the mesh, so that every size of drop would cross it.
+    const auto at_vertex =
+        std::min_element(mesh.vertices.begin(), mesh.vertices.end(), [](const Vec3& a, const Vec3& b) {
+            const auto off = [](const Vec3& p) { return (p - Vec3(p.array().round())).norm(); };
+            return off(a) < off(b);
+        });
+    const Vec3 node = at_vertex->array().round();
+    const Vec3 shift = node - *at_vertex;
+    for (Vec3& v : mesh.vertices) v += shift;
+    const std::size_t before = mesh.carved.triangles.size();
+    EXPECT_FALSE(put_in_drops({{node}}, mesh, now.inspection, now.inspector, surface));
+    EXPECT_EQ(mesh.carved.triangles.size(), before);
+    EXPECT_EQ(mesh.vertices.size(), mesh.on_surface.size());
 }
 
 }  // namespace

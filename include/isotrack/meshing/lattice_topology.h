@@ -18,6 +18,8 @@ struct LatticeTopology {
     /// void. Also all nodes of a component that volumeToMesh parts from others it touches across an edge or a
     /// corner, where the mesh has none of them. World positions, in the order of the nodes.
     std::vector<Vec3> faults;
+    /// The nodes of the latter, component by component. World positions.
+    std::vector<std::vector<Vec3>> lost;
     /// Diagonals of the surface that the mesh crosses twice or more often: it parts what they join.
     std::vector<Surface::Diagonal> parted;
     /// Per triangle: it belongs to a component that volumeToMesh does not have. It holds no node on its own;
