@@ -52,7 +52,7 @@ struct Pace {
 };
 constexpr Pace kAtFirst{{}, 0.3, 7};
 // Ids live longer, and so does what certify added last.
-constexpr Pace kFollowing{{0.6, 0.85, 0.08}, 0.6, 3};
+constexpr Pace kFollowing{{0.6, 0.85, 0.09}, 0.6, 3};
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr double kDetail = 2.0;       // tolerances
 constexpr double kDetailOfEdges = 0.25;
