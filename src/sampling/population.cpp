@@ -56,10 +56,8 @@ std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacen
         keep[i] = 0;
         dying.push_back(i);
     }
-    const auto most =
-        std::max(static_cast<std::size_t>(std::max(band.deaths, 0.0) * static_cast<double>(keep.size())),
-                 (dying.size() + 1) / 2);
-    for (std::size_t d = most; d < dying.size(); ++d) keep[dying[d]] = 1;
+    const auto deaths = static_cast<std::size_t>(std::ceil(band.deaths * static_cast<double>(dying.size())));
+    for (std::size_t d = deaths; d < dying.size(); ++d) keep[dying[d]] = 1;
     return keep;
 }
 

@@ -82,7 +82,10 @@ public:
                                 upward ? high_corner : low_corner};
     }
 
-    void join(const int* corners) { joined_[joins_++] = {corners[0], corners[1]}; }
+    /// More than one for each face come from cells too far out to be told apart.
+    void join(const int* corners) {
+        if (joins_ < static_cast<int>(joined_.size())) joined_[joins_++] = {corners[0], corners[1]};
+    }
 
     /// Crossings are of one part of the surface when the corners inside at them are joined, and those
     /// outside, too.

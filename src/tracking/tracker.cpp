@@ -51,8 +51,10 @@ struct Pace {
     int sweeps;
 };
 constexpr Pace kAtFirst{{}, 0.3, 7};
-// Ids live longer, and so does what certify added last.
-constexpr Pace kFollowing{{0.6, 0.85, 0.09}, 0.6, 3};
+constexpr Pace kFollowing{{0.6, 0.85}, 0.6, 3};  // ids live longer, and so does what certify added last
+// Of the particles: when more are lost with the surface they were on, the rest changes slowly, too.
+constexpr double kManyLost = 0.03;
+constexpr double kDeathsThen = 0.5;
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr double kDetail = 2.0;       // tolerances
 constexpr double kDetailOfEdges = 0.25;
@@ -60,6 +62,7 @@ constexpr double kLeastEdge = 0.5, kLargestEdge = 40.0;  // details
 constexpr double kCrossingsApart = 0.5;  // details: what lies between crossings is found from the triangles
 constexpr double kBandShare = 0.8;       // of the reach: interpolated values are right up to there
 constexpr int kCertifyRounds = 24;
+constexpr int kMostTrials = 2;        // rounds of other labels: each takes some meshes
 constexpr int kMostRelabellings = 4;  // what changes sides might go on changing them
 // Particles that are added at most, at a tolerance of half a detail. A clean level set takes a quarter of
 // that; one with holes in its band would take more than it has lattice edges.
@@ -289,8 +292,9 @@ void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const 
         update_spacing(particles, last_mesh.ring, last_mesh.evidence, paced);
     }
     const StageTimer timer(frame.seconds, "relax");
-    PopulationBand band = pace.band;  // its deaths are those of a frame
-    band.deaths -= static_cast<double>(frame.lost) / static_cast<double>(particles.size() + frame.lost);
+    PopulationBand band = pace.band;
+    if (static_cast<double>(frame.lost) > kManyLost * static_cast<double>(particles.size()))
+        band.deaths = kDeathsThen;
     auto keep = uncrowded(particles, last_mesh.ring, band);
     const std::vector<Triangle> parents =
         fill_sparse(particles, last_mesh.triangles, last_mesh.ring, surface, next_id, pace.band);
@@ -403,19 +407,20 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         const bool guided =
             options.method == Method::Tolerance && options.reconstruction == Reconstruction::Guided;
         if (guided) {
-            LabelTrials trials(labels, mesh, inspection, *inspector, l, carve_labels, fit_other);
-            const std::size_t joined = join_specks(trials, dt->cells(), particles, surface, l);
-            if (mend_handles(trials, dt->cells(), particles, last_mesh.evidence.thickness, surface) + joined >
+            LabelTrials of_labels(labels, mesh, inspection, *inspector, l, carve_labels, fit_other);
+            const std::size_t joined = join_specks(of_labels, dt->cells(), particles, surface, l);
+            if (mend_handles(of_labels, dt->cells(), particles, last_mesh.evidence.thickness, surface) +
+                    joined >
                 0)
                 last_mesh.take(mesh.carved, particles, dt->cells());
         }
         const std::vector<std::vector<Vec3>> lost = inspection.topology.lost;
         remove_specks(mesh, inspection, *inspector, l);
-        if (guided) put_in_drops(lost, mesh, inspection, *inspector, surface);
+        if (guided && !options.min_edge) put_in_drops(lost, mesh, inspection, *inspector, surface);
     };
     // The topology, which takes longer to look at, is looked at when all else passes, and so is once more
     // what lies between crossings.
-    int relabellings = 0;
+    int relabellings = 0, trials = 0;
     for (int round = 0;; ++round) {
         if (round > 0 || added > 0) {
             tetrahedralise(false, seconds);
@@ -451,7 +456,8 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
             inspector->inspect_topology(mesh, inspection);
             if (!passes()) continue;
             try_other_labels();  // which may find more that is missed
-            if (last || inspection.missed.empty() || mend(mesh, inspection, surface, l, *densifier) == 0)
+            if (last || ++trials == kMostTrials || inspection.missed.empty() ||
+                mend(mesh, inspection, surface, l, *densifier) == 0)
                 break;
         }
     }
