@@ -184,7 +184,8 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
                     }
             }
         });
-    for (const Join& join : joins_) wanted.push_back(join.cell);
+    if (given_.empty())
+        for (const Join& join : joins_) wanted.push_back(join.cell);
     tbb::parallel_sort(wanted.begin(), wanted.end());
     wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
     std::vector<std::uint64_t> fresh, all;

@@ -36,7 +36,7 @@ struct Inspection {
     std::size_t lost_crossings = 0;      ///< Of these and those: not found.
     LatticeTopology topology;
     std::vector<Shortage>
-        doubtful;  ///< Crossings near its faults and near what was mended in vain, and that.
+        doubtful;  ///< Crossings near its faults and near what was mended in vain, and all missed between.
 };
 
 /// The largest of `errors` (one per triangle) around each of so many particles; negative without a triangle.
@@ -80,7 +80,8 @@ private:
     /// not when it was seen last.
     std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
     void take_missed(std::size_t d, Inspection& result);  // by distances_[d]
-    /// Means of crossings may be off the surface, farther than any mesh of it can be from them.
+    /// Means of crossings may be so far off the surface that a mesh with vertices on it is beyond the
+    /// tolerance of them.
     void leave_out_unreachable(std::vector<Surface::Crossing>& points) const;
     void forget_distances();
     double cutoff() const;

@@ -83,6 +83,9 @@ FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out) {
     compact(result.vertices, keep);
     compact(result.on_surface, keep);
     compact(carved.particle, keep);
+    carved.midpoints.clear();
+    for (std::size_t v = 0; v < carved.particle.size(); ++v)
+        if (carved.particle[v] < 0) carved.midpoints.push_back(result.on_surface[v]);
     const std::vector<int> number = numbers_after(keep);
     for (Triangle& t : carved.triangles)
         for (int& v : t) v = number[v];

@@ -12,12 +12,13 @@ namespace isotrack {
 /// and edges.
 struct CarvedSurface {
     std::vector<Triangle> triangles;  ///< Output vertices, counter-clockwise seen from outside.
-    std::vector<int> particle;  ///< Per output vertex: the particle it stands on; -1 for an edge midpoint.
+    /// Per output vertex: the particle it stands on; -1 for an edge midpoint, and in a drop that was put in.
+    std::vector<int> particle;
     std::vector<Vec3>
         midpoints;  ///< Positions of the output vertices that stand on no particle: the last ones, in order.
     static constexpr int kNoCell = -1;
     /// Per triangle: the cell behind it; midpoints split a triangle, both halves keep its cell. kNoCell: it
-    /// was flipped and is no facet any more.
+    /// is no facet, since it was flipped or belongs to a drop that was put in.
     std::vector<int> inside_cell;
     std::vector<int> inside_facet;  ///< Per triangle: the index of that cell's vertex opposite the facet.
 

@@ -62,9 +62,10 @@ SizingLimits sizing_limits(const TrackerOptions& options, const Surface& surface
 struct TrackedFrame {
     /// Closed, oriented, 2-manifold; per vertex the id and the velocity (displacement since the last frame)
     /// of its particle, beside which it may stand: moved by the fit, or along the surface where triangles
-    /// were sharp.
+    /// were sharp. Drops too small for tetrahedra have no particles: new ids in every frame, and no velocity.
     TriangleMesh mesh;
-    std::size_t particles = 0;  ///< Vertices beyond these are copies that keep the mesh manifold.
+    /// Vertices beyond these are copies that keep the mesh manifold, or of such drops.
+    std::size_t particles = 0;
     std::size_t born = 0, died = 0, seeded = 0, lost = 0;
     int sweeps = 0;             ///< Relaxation sweeps over all particles.
     std::size_t relocated = 0;  ///< Vertices the tetrahedralisation moved one by one.
@@ -72,9 +73,10 @@ struct TrackedFrame {
     double tolerance = 0.0;  ///< The one that was used.
     /// The larger of the distances mesh to surface (at 28 points of each triangle) and back (at the lattice
     /// crossings, of which those nearer to each other than two tolerances stand for one another; where they
-    /// are so far apart anyway also at points between those that are nearly too far off or at folds of the
-    /// mesh), measured on `mesh`, world units; RMS likewise, but for the points between. What is farther than
-    /// three tolerances from any triangle that faces its way is counted as lost instead.
+    /// are so far apart anyway also at points between those that are nearly too far off, at folds of the
+    /// mesh, or in cells with an ambiguous face, but for points that no vertex on the surface reaches),
+    /// measured on `mesh`, world units; RMS likewise, but for the points between. What is farther than three
+    /// tolerances from any triangle that faces its way is counted as lost instead.
     double max_error = 0.0, rms_error = 0.0;
     bool opened = false;             ///< A cap was left out: the mesh has a border there.
     std::size_t lost_crossings = 0;  ///< Features below the grid's resolution that the mesh does not hold.
