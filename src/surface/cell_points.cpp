@@ -15,7 +15,8 @@ namespace {
 
 constexpr int kBits = 21;  // of a cell's coordinate
 constexpr double kHalfRange = 1 << (kBits - 1);
-constexpr double kAtNode = 1e-4;  // of an edge
+constexpr double kAtNode = 1e-4;    // of an edge
+constexpr float kLeastWay = 0.01f;  // of a sum of unit vectors
 
 std::uint64_t packed(const Vec3& cell) {
     std::uint64_t result = 0;
@@ -95,20 +96,23 @@ public:
         for (int i = 0; i < count_; ++i) {
             if (done[i]) continue;
             Vec3 sum = Vec3::Zero();
-            std::array<int, 12> with{};  // of each: crossings of its part with its direction
-            int members = 0, most = i;
+            int members = 0;
+            std::array<Eigen::Vector3f, 6> ways;  // always summed in the same order: they stay few
+            ways.fill(Eigen::Vector3f::Zero());
             for (int j = i; j < count_; ++j) {
-                if (part[crossings_[j].inside] != part[crossings_[i].inside] ||
-                    part[crossings_[j].outside] != part[crossings_[i].outside])
+                const auto& [point, outward, inside, outside] = crossings_[j];
+                if (part[inside] != part[crossings_[i].inside] ||
+                    part[outside] != part[crossings_[i].outside])
                     continue;
                 done[j] = true;
-                sum += crossings_[j].point;
+                sum += point;
                 ++members;
-                int first = i;
-                while (crossings_[first].outward != crossings_[j].outward) ++first;
-                if (++with[first] > with[most]) most = first;
+                ways[(inside ^ outside) / 2 + (inside < outside ? 3 : 0)] = outward;
             }
-            means.push_back({sum / members, crossings_[most].outward});
+            Eigen::Vector3f way = Eigen::Vector3f::Zero();
+            for (const Eigen::Vector3f& w : ways) way += w;
+            const bool any = way.squaredNorm() > kLeastWay * kLeastWay;
+            means.push_back({sum / members, any ? way.normalized() : crossings_[i].outward});
         }
     }
 

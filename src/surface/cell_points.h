@@ -17,8 +17,8 @@ public:
 
     /// In the cells around the edges that some crossings are on, and in all with an ambiguous face: for each
     /// part of the surface in a cell the mean of its crossings, where volumeToMesh has its vertices. Outward
-    /// is the direction of the lattice that most of them go. Cells given before are left out. In an order
-    /// that does not depend on the number of threads.
+    /// is the middle between the directions they go; one of them where these cancel out. Cells given before
+    /// are left out. In an order that does not depend on the number of threads.
     std::vector<Surface::Crossing> around(const std::vector<int>& some);
 
 private:

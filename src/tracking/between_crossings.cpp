@@ -10,7 +10,7 @@
 namespace isotrack {
 namespace {
 
-constexpr double kNearlyTooFar = 0.85, kNearlyAtFolds = 0.1;  // of the tolerance
+constexpr double kNearlyTooFar = 0.8, kNearlyAtFolds = 0.1;  // of the tolerance
 constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
 
 template <typename Body>

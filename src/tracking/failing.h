@@ -9,7 +9,7 @@
 namespace isotrack {
 
 constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's largest error is searched for
-constexpr double kCertified = 0.98;  // of the tolerance: so that samples at other places find it kept, too
+constexpr double kCertified = 0.97;  // of the tolerance: so that samples at other places find it kept, too
 
 /// Whether the angles of a triangle between particles matter: on smooth surface, and not tiny.
 inline bool angles_matter(const Particles& particles, const Triangle& corner, double resolution) {

@@ -9,6 +9,7 @@
 
 #include "sampling/compact.h"
 #include "surface/lattice_scan.h"
+#include "surface/surface_near.h"
 #include "surface/thread_probes.h"
 #include "tracking/failing.h"
 
@@ -201,8 +202,7 @@ void Inspector::leave_out_unreachable(std::vector<Surface::Crossing>& points) co
             const Vec3& p = points[i].point;
             keep[i] = std::abs(probe.value(p)) < kNear * limits_.tolerance;
             if (keep[i]) continue;
-            const auto there = probe.project(p);
-            keep[i] = there && (*there - p).norm() < kReachable * limits_.tolerance;
+            keep[i] = surface_near(probe, p, kReachable * limits_.tolerance).has_value();
         }
     });
     compact(points, keep);

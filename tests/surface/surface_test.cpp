@@ -14,6 +14,7 @@
 
 #include "isotrack/surface/crossing_grid.h"
 #include "isotrack/surface/shapes.h"
+#include "surface/surface_near.h"
 
 namespace isotrack {
 namespace {
@@ -148,6 +149,45 @@ TEST(Projection, GivesUpWhereThereIsNoWay) {
     EXPECT_FALSE(probe->project({0.8 + 60 * kResolution, 0, 0}));
     // On the surface already: stays.
     EXPECT_EQ(*probe->project({0.8, 0, 0}), Vec3(0.8, 0, 0));
+}
+
+/// The half space x < `at`, whose gradient points along the surface: Newton's method finds no way.
+class Astray final : public Surface::Probe {
+public:
+    explicit Astray(double at) : Probe(kEpsilon, kResolution), at_(at) {}
+    double value(const Vec3& p) override { return p.x() - at_; }
+    Surface::Sample sample(const Vec3& p) override { return {value(p), Vec3::UnitY()}; }
+
+private:
+    double at_;
+};
+
+TEST(SurfaceNear, IsTheProjectionWhereThereIsOne) {
+    const auto probe = Plain(shapes::sphere({0, 0, 0}, 0.8, kResolution)).probe();
+    const Vec3 p = 0.82 * Vec3(1, 2, 3).normalized();
+    EXPECT_EQ(*surface_near(*probe, p, 0.03), *probe->project(p));
+    EXPECT_FALSE(surface_near(*probe, p, 0.01));
+}
+
+TEST(SurfaceNear, LooksAroundWhereThereIsNone) {
+    for (const double at : {0.3, -0.3}) {
+        Astray probe(at);
+        ASSERT_FALSE(probe.project(Vec3::Zero()));
+        const auto found = surface_near(probe, Vec3::Zero(), 0.5);
+        ASSERT_TRUE(found);
+        EXPECT_NEAR((*found - Vec3(at, 0, 0)).norm(), 0.0, 1e-6);  // along an axis it is nearest
+        EXPECT_FALSE(surface_near(probe, Vec3::Zero(), 0.29));
+    }
+    // A slab thinner than the steps along a segment is found if a step ends in it, else stepped over.
+    class Slab final : public Surface::Probe {
+    public:
+        Slab() : Probe(kEpsilon, kResolution) {}
+        double value(const Vec3& p) override { return std::abs(p.x() - 0.25) - 0.01; }
+        Surface::Sample sample(const Vec3& p) override { return {value(p), Vec3::Zero()}; }
+    } slab;
+    const auto found = surface_near(slab, Vec3::Zero(), 0.5);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR((*found - Vec3(0.24, 0, 0)).norm(), 0.0, 1e-6);
 }
 
 TEST(Normal, IsTheUnitOutwardGradient) {

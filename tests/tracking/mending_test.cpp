@@ -16,6 +16,7 @@
 #include "support/meshes.h"
 #include "surface/cell_points.h"
 #include "surface/float_precision.h"
+#include "tracking/failing.h"
 #include "tracking/handles.h"
 #include "tracking/inspection.h"
 #include "tracking/lost_drops.h"
@@ -184,7 +185,7 @@ TEST(Inspector, FindsWhatIsMissedBetweenCrossingsThatAreReached) {
     int found = 0;
     for (double tolerance = 0.02; tolerance < 0.1; tolerance += 0.001) {
         carved.limits.tolerance = tolerance;
-        const double limit = 0.98 * tolerance;
+        const double limit = kCertified * tolerance;
         const auto distances =
             crossing_distances(mesh.vertices, mesh.carved.triangles, cells, 3.0 * tolerance);
         Inspector inspector(*box, carved.limits, crossings);
@@ -260,7 +261,7 @@ TEST_P(RefitOfABox, TakesBackWhatItMustNot) {
     // Some may not have been looked at before.
     for (const double d : crossing_distances(before.vertices, before.carved.triangles,
                                              CrossingGrid(last.missed, kResolution), GetParam()))
-        EXPECT_GT(d, 0.98 * GetParam() - 1e-6);
+        EXPECT_GT(d, kCertified * GetParam() - 1e-6);
 }
 
 TEST(MeshDistances, AfterChangesAreThoseMeasuredAnew) {
