@@ -14,9 +14,8 @@
 namespace isotrack {
 namespace {
 
-constexpr double kSeedDistance = 0.7;  // of the spacing: what a seed covers
-constexpr double kReach = 1.2;         // of the spacing: what a particle that is already there covers
-constexpr double kNear = 0.75;         // of the spacing: where most of that is
+constexpr double kReach = 1.2;  // of the spacing: what a particle that is already there covers
+constexpr double kNear = 0.75;  // of the spacing: where most of that is
 constexpr double kOffPlane =
     0.5;  // of the reach: how far from a particle's tangent plane surface counts as its own
 // A lattice edge along the surface, up to this cosine, counts to either side where it crosses at the particle
@@ -37,7 +36,7 @@ std::uint64_t mix(std::uint64_t x) {
 }  // namespace
 
 std::size_t cover(Particles& particles, const Surface& surface, const CrossingGrid& grid,
-                  const SizingLimits& limits, std::uint64_t seed, Id& next_id) {
+                  const SizingLimits& limits, std::uint64_t seed, Id& next_id, double apart) {
     if (grid.empty()) return 0;
     const double spacing = grid.spacing();
     std::vector<std::atomic<char>> covered(grid.size());  // marked by several threads
@@ -108,7 +107,7 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
             const auto& [p, n, h] = seeds[i];
             if (!(h > 0.0)) continue;
             particles.add(p, n, h, next_id++);
-            mark(p, n, kSeedDistance * h);
+            mark(p, n, apart * h);
             ++added;
         }
     }

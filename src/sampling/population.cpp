@@ -9,6 +9,7 @@
 #include "find_in_blocks.h"
 #include "sampling/metric.h"
 #include "surface/float_precision.h"
+#include "surface/surface_near.h"
 
 namespace isotrack {
 
@@ -135,7 +136,9 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
             }))
             continue;
         const Vec3 velocity = (particles.velocity[a] + particles.velocity[b] + particles.velocity[c]) / 3.0;
-        const double h = (particles.spacing[a] + particles.spacing[b] + particles.spacing[c]) / 3.0;
+        const double ha = particles.spacing[a], hb = particles.spacing[b], hc = particles.spacing[c];
+        const double h =
+            std::min((ha + hb + hc) / 3.0, std::max({ha, hb, hc}));  // rounding may not add to it
         particles.add(*p, n, h, next_id++, velocity);
         particles.stretch.back() = particles.stretch[a];
         touched[a] = touched[b] = touched[c] = 1;
@@ -144,11 +147,12 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
     return parents;
 }
 
-Densifier::Densifier(Particles& particles, const Surface& surface, double min_spacing, std::size_t most,
-                     Id& next_id)
+Densifier::Densifier(Particles& particles, const Surface& surface, double min_spacing, double max_spacing,
+                     std::size_t most, Id& next_id)
     : particles_(particles),
       surface_(surface),
       min_spacing_(min_spacing),
+      max_spacing_(max_spacing),
       most_(most),
       next_id_(next_id),
       probe_(surface.probe()),
@@ -195,10 +199,11 @@ std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
 
 int Densifier::add_or_nearest(const Vec3& place, double h) {
     constexpr double kApart = 0.7, kFar = 10.0;
-    constexpr double kFarthest = 8.0;  // resolutions
+    constexpr double kFarthest = 8.0, kNearEnough = 0.5;  // resolutions
     int nearest = -1;
     if (particles_.size() >= most_) return nearest;
-    const auto projected = probe_->project(place);
+    auto projected = probe_->project(place);
+    if (!projected) projected = surface_near(*probe_, place, kNearEnough * surface_.resolution());
     if (!projected) return nearest;
     const Vec3 p = to_float_precision(*projected), n = probe_->normal(p);
     const double apart = kApart * h,
@@ -219,7 +224,7 @@ int Densifier::add_or_nearest(const Vec3& place, double h) {
     if (nearest >= 0 && distance < std::min(apart, kApart * particles_.spacing[nearest])) return nearest;
     grid_.insert(p, static_cast<int>(in_grid_++));
     const double spacing = distance < apart ? distance / kApart : std::max(distance, h);
-    particles_.add(p, n, std::max(spacing, min_spacing_), next_id_++);
+    particles_.add(p, n, std::max(std::min(spacing, max_spacing_), min_spacing_), next_id_++);
     widest_of_call_ = std::max(widest_of_call_, particles_.spacing.back());
     return -1;
 }

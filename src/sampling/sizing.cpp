@@ -138,25 +138,17 @@ double lower_quartile(std::vector<double> spacing) {
 /// What the error aimed at is multiplied by where its mean square counts.
 class AimFactor {
 public:
-    AimFactor(const Particles& particles, const SizingEvidence& evidence, double aim)
-        : wide_(lower_quartile(particles.spacing)) {
-        double known = 0.0, with_error = 0.0;
-        for (const double e : evidence.error) {
-            known += e >= 0.0;
-            with_error += e > kHardlyAny * aim;
-        }
-        if (known > 0.0) everywhere_ = std::clamp(std::pow(with_error / known / kMost, 2.0), kLeast, 1.0);
-    }
+    AimFactor(const Particles& particles, double share_with_error)
+        : wide_(lower_quartile(particles.spacing)),
+          everywhere_(std::clamp(std::pow(share_with_error / kMost, 2.0), kLeast, 1.0)) {}
     /// For a particle of this spacing.
     double operator()(double h) const { return everywhere_ * std::min(1.0, std::sqrt(wide_ / h)); }
 
 private:
-    // Of the aim before these factors: below it is what triangles of the least factor still have.
-    static constexpr double kHardlyAny = 0.15;
     static constexpr double kMost = 0.9;  // of the particles have an error on smooth surfaces
     static constexpr double kLeast = 0.35;
 
-    double wide_, everywhere_ = 1.0;
+    double wide_, everywhere_;
 };
 
 double bounded(double h, const SizingLimits& limits) {
@@ -181,6 +173,17 @@ double spacing_from_curvature(Surface::Probe& probe, const Vec3& p, const Vec3& 
     return bounded(std::min(by_error, by_angle), limits);
 }
 
+double share_with_error(const SizingEvidence& evidence, const SizingLimits& limits) {
+    // Of the aim: triangles for the least of the aims below still have that.
+    constexpr double kHardlyAny = 0.15;
+    double known = 0.0, with_error = 0.0;
+    for (const double e : evidence.error) {
+        known += e >= 0.0;
+        with_error += e > kHardlyAny * kShare * limits.tolerance;
+    }
+    return known > 0.0 ? with_error / known : 1.0;
+}
+
 double normal_deviation(const Particles& particles, const Adjacency& adjacency, std::size_t i) {
     double k2 = 0.0;
     for (const int j : adjacency.of(i)) {
@@ -198,7 +201,7 @@ void update_spacing(Particles& particles, const Adjacency& adjacency, const Sizi
     if (n == 0) return;
     const double same = kShare * limits.tolerance;
     std::optional<AimFactor> factor;
-    if (limits.mean_square_counts) factor.emplace(particles, evidence, same);
+    if (limits.mean_square_counts) factor.emplace(particles, share_with_error(evidence, limits));
     std::vector<double> log_k2(n);
     for_each_particle(n, [&](std::size_t i) {
         const double h = particles.spacing[i], e = evidence.error[i];

@@ -39,9 +39,9 @@ namespace isotrack {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr int kColdRounds = 3, kWarmRounds = 2;
+constexpr int kRounds = 2, kDenseRounds = 3;
 constexpr int kMendingSweeps = 3;
-constexpr int kMostMendings = 3;
+constexpr int kMostMendings = 1;
 constexpr double kAstray = 0.125;  // of the particles: so many newborn at the end of the arrays are too many
 constexpr double kFew = 0.02;      // of the particles: few enough to be added by certify, without relaxation
 /// How fast the population goes after the wanted spacing.
@@ -50,13 +50,14 @@ struct Pace {
     double thinning;
     int sweeps;
 };
-constexpr Pace kAtFirst{{}, 0.3, 7};
+constexpr Pace kAtFirst{{}, 0.3, 5}, kDenseAtFirst{{}, 0.3, 7};
 constexpr Pace kFollowing{{0.6, 0.85}, 0.6, 3};  // ids live longer, and so does what certify added last
 // Of the particles: when more are lost with the surface they were on, the rest changes slowly, too.
 constexpr double kManyLost = 0.03;
 constexpr double kDeathsThen = 0.5;
-constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
-constexpr double kDetail = 2.0;       // tolerances
+constexpr double kFewWithError = 0.9;  // of the particles: smooth surfaces have more
+constexpr double kMostSeeded = 0.05;   // of the particles; with more the next frame is half a cold start
+constexpr double kDetail = 2.0;        // tolerances
 constexpr double kDetailOfEdges = 0.25;
 constexpr double kLeastEdge = 0.5, kLargestEdge = 40.0;  // details
 constexpr double kCrossingsApart = 0.5;  // details: what lies between crossings is found from the triangles
@@ -210,7 +211,7 @@ struct Tracker::Impl {
         const auto most =
             kMostAnyway + static_cast<std::size_t>(kMostPerCrossing * finer * static_cast<double>(crossings));
         const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
-        return {particles, surface, least, most, next_id};
+        return {particles, surface, least, l.max_edge, most, next_id};
     }
 
     /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
@@ -238,36 +239,55 @@ struct Tracker::Impl {
 
     void follow(const Surface& surface, const SizingLimits& l, const Pace& pace, TrackedFrame& frame);
     void make_room(const Surface& surface, TrackedFrame& frame);
-    void sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
+    void measure(const Surface& surface, TrackedFrame& frame);
+    void seed(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, double apart,
+              TrackedFrame& frame);
+    void sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, bool warm,
+                TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     Finish begin(const Surface& surface, const Motion& motion);
 };
 
-/// Rounds of: mesh, measure, follow. More of them the more particles are new.
-void Tracker::Impl::sample(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame) {
+/// Meshes the particles, and measures what the next births and deaths go by.
+void Tracker::Impl::measure(const Surface& surface, TrackedFrame& frame) {
     constexpr int kSizingSteps = 3;  // barycentric lattice of the samples: with the centroid
     auto& seconds = frame.seconds;
-    const double fresh =
-        particles.empty() ? 0.0 : static_cast<double>(frame.seeded) / static_cast<double>(particles.size());
-    const int rounds =
-        warm ? kWarmRounds +
-                   static_cast<int>(std::lround(std::min(1.0, 4.0 * fresh) * (kColdRounds - kWarmRounds)))
-             : kColdRounds;
+    tetrahedralise(true, seconds);
+    FrameMesh mesh = carve_mesh(surface, seconds);
+    if (options.fit) {
+        const StageTimer timer(seconds, "fit");
+        Fitted().fit_vertices(mesh, particles.size(), surface);
+    }
+    const StageTimer timer(seconds, "size");
+    last_mesh.evidence.error = errors_at_particles(
+        mesh, triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps), particles.size());
+    last_mesh.take(mesh.carved, particles, dt->cells());
+}
+
+/// The first particles, in order.
+void Tracker::Impl::seed(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
+                         double apart, TrackedFrame& frame) {
+    const StageTimer timer(frame.seconds, "cover");
+    particles = {};
+    last_mesh = {};
+    frame.seeded = cover(particles, surface, crossings, l, options.seed, next_id, apart);
+    arrange();
+}
+
+/// Rounds of: mesh, measure, follow.
+void Tracker::Impl::sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
+                           bool warm, TrackedFrame& frame) {
+    measure(surface, frame);
+    // Where flat faces meet nearly all of the mean square is at few particles, and certify adds none for it.
+    const bool dense = options.fit && !warm && share_with_error(last_mesh.evidence, l) < kFewWithError;
+    if (dense) {
+        seed(surface, crossings, l, kDenseSeeds, frame);
+        measure(surface, frame);
+    }
+    const int rounds = dense ? kDenseRounds : kRounds;
     for (int round = 0; round < rounds; ++round) {
-        tetrahedralise(true, seconds);
-        FrameMesh mesh = carve_mesh(surface, seconds);
-        if (options.fit) {
-            const StageTimer timer(seconds, "fit");
-            Fitted().fit_vertices(mesh, particles.size(), surface);
-        }
-        {
-            const StageTimer timer(seconds, "size");
-            last_mesh.evidence.error = errors_at_particles(
-                mesh, triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps),
-                particles.size());
-            last_mesh.take(mesh.carved, particles, dt->cells());
-        }
-        follow(surface, l, kAtFirst, frame);
+        if (round > 0) measure(surface, frame);
+        follow(surface, l, dense ? kDenseAtFirst : kAtFirst, frame);
         if (!warm) arrange();
     }
 }
@@ -346,15 +366,16 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     {
         const StageTimer timer(seconds, "cover");
         work->crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
-        frame.seeded = cover(particles, surface, *work->crossings, l, options.seed, next_id);
-        if (!warm) arrange();
+        if (warm) frame.seeded = cover(particles, surface, *work->crossings, l, options.seed, next_id);
     }
-    if (options.method == Method::Paper)
+    const bool as_in_paper = options.method == Method::Paper;
+    if (!warm) seed(surface, *work->crossings, l, as_in_paper ? kDenseSeeds : kSparseSeeds, frame);
+    if (as_in_paper)
         sample_as_in_paper(surface, l, warm, frame);
     else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))
         follow(surface, l, kFollowing, frame);
     else
-        sample(surface, l, warm, frame);
+        sample(surface, *work->crossings, l, warm, frame);
     Fitted fitted;
     const auto make_mesh = [&] {
         mesh = carve_mesh(surface, seconds);

@@ -32,6 +32,8 @@ using support::limits_of;
 using support::nearest_distance;
 using support::random_on_unit_sphere;
 
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+
 TEST(Cover, LeavesNoCrossingFarFromAParticleThatFacesItsWay) {
     constexpr double kEdge = 0.2;
     const auto surface = shapes::torus({0.01, 0.02, 0.03}, 1.0, 0.3, 0.05);
@@ -191,6 +193,13 @@ SizingLimits limits_of_error(double tolerance) {
 
 SizingEvidence of_errors(const std::vector<double>& error) {
     return {error, std::vector<double>(error.size(), std::numeric_limits<double>::infinity())};
+}
+
+TEST(ShareWithError, CountsThoseWhoseErrorIsKnown) {
+    const SizingLimits limits = limits_of_error(0.01);
+    EXPECT_EQ(share_with_error(of_errors({}), limits), 1.0);
+    EXPECT_EQ(share_with_error(of_errors({-1.0, -1.0}), limits), 1.0);
+    EXPECT_EQ(share_with_error(of_errors({-1.0, 0.0, 0.0005, 0.0025, 0.02}), limits), 0.5);
 }
 
 TEST(UpdateSpacing, GetsSmallerTheLargerTheError) {
@@ -531,8 +540,8 @@ TEST(Densifier, StopsAtTheMostThatMayBe) {
     particles.add({0, 0, 1}, {0, 0, 1}, 0.4, 0);
     Id next_id = 1;
     const std::vector<Shortage> places = {{{0, 0, 1}, 0.4}, {{1, 0, 0}, 0.4}, {{0, 1, 0}, 0.4}};
-    EXPECT_EQ(Densifier(particles, *sphere, 0.05, 1, next_id).add(places), 0u);
-    Densifier five(particles, *sphere, 0.05, 5, next_id);
+    EXPECT_EQ(Densifier(particles, *sphere, 0.05, kNoLimit, 1, next_id).add(places), 0u);
+    Densifier five(particles, *sphere, 0.05, kNoLimit, 5, next_id);
     EXPECT_EQ(five.add(places), 4u);
     EXPECT_EQ(particles.size(), 5u);
     EXPECT_EQ(five.add(places), 0u);
@@ -543,7 +552,7 @@ TEST(Densifier, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
     Particles particles;
     particles.add({0, 0, 1}, {0, 0, 1}, 0.4, 0);
     Id next_id = 1;
-    Densifier densifier(particles, *sphere, 0.05, 1000, next_id);
+    Densifier densifier(particles, *sphere, 0.05, kNoLimit, 1000, next_id);
     EXPECT_EQ(densifier.add({}), 0u);
     EXPECT_EQ(densifier.add({{{1.1, 0, 0}, 0.4}}), 1u);
     ASSERT_EQ(particles.size(), 2u);
@@ -582,7 +591,7 @@ TEST(Densifier, GivesRoomForOneAtATimeWhereParticlesAreFarApart) {
     Particles particles;
     particles.add({0, 0, 1}, {0, 0, 1}, 0.8, 0);
     Id next_id = 1;
-    Densifier densifier(particles, *sphere, 0.01, 1000, next_id);
+    Densifier densifier(particles, *sphere, 0.01, kNoLimit, 1000, next_id);
     const Vec3 place = Vec3(0.6, 0, 0.8), beside = Vec3(0.65, 0.02, 0.76).normalized();
     const std::vector<Shortage> both = {{place, 0.1}, {beside, 0.1}};
     EXPECT_EQ(densifier.add(both), 1u);
@@ -594,13 +603,23 @@ TEST(Densifier, GivesRoomForOneAtATimeWhereParticlesAreFarApart) {
     EXPECT_NEAR(particles.spacing.back(), 0.8, 1e-6);
 }
 
+TEST(Densifier, GivesNoSpacingAboveItsLargest) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    Particles particles;
+    particles.add({0, 0, 1}, {0, 0, 1}, 0.3, 0);
+    Id next_id = 1;
+    Densifier densifier(particles, *sphere, 0.01, 0.3, 1000, next_id);
+    EXPECT_EQ(densifier.add({{{0.6, 0, 0.8}, 0.1}, {{0, 0, -1}, 0.5}}), 2u);
+    for (const double h : particles.spacing) EXPECT_LE(h, 0.3);
+}
+
 TEST(Densifier, GetsDenserUntilASmallBodyHasRoomForMore) {
     // Places at the wanted distance from the particle on a ball are none of the ball's, or are taken.
     const auto ball = shapes::sphere({0, 0, 0}, 0.03, 0.1);
     Particles particles;
     particles.add({0, 0, 0.03}, {0, 0, 1}, 1.0, 0);
     Id next_id = 1;
-    Densifier densifier(particles, *ball, 1e-4, 1000, next_id);
+    Densifier densifier(particles, *ball, 1e-4, kNoLimit, 1000, next_id);
     EXPECT_EQ(densifier.add({{{0, 0, 0.03}, 0.4, 0.1}}), 0u);
     EXPECT_GT(densifier.add({{{0, 0, 0.03}, 0.4, 0.001}}), 0u);
     EXPECT_LT(particles.spacing[0], 0.1);

@@ -43,19 +43,21 @@ struct Shortage {
 /// Adds particles where the mesh fails, call by call. Between calls no particle may be moved or removed.
 class Densifier {
 public:
-    /// There will be no more than `most` particles. All references must outlive it.
-    Densifier(Particles& particles, const Surface& surface, double min_spacing, std::size_t most,
-              Id& next_id);
+    /// There will be no more than `most` particles, and no new one's spacing will be outside `min_spacing` to
+    /// `max_spacing`. All references must outlive it.
+    Densifier(Particles& particles, const Surface& surface, double min_spacing, double max_spacing,
+              std::size_t most, Id& next_id);
 
-    /// Adds particles at the projections of `shortages`, in their order, at places that floats can hold: at
-    /// least 0.7 of the wanted spacing, or of that of the nearest particle, from those that face the same
-    /// way. A particle that was there before and is nearer is surrounded instead: its spacing becomes 0.6 of
-    /// the smaller of its own and the wanted one, down to `min_spacing` and `least`, and six more are added
-    /// around it at that distance, so that repeated calls get denser; where there is no place for any, as on
-    /// what is smaller than the ring, that becomes smaller still. Where there is room for more than the
-    /// wanted spacing a particle takes the distance to the nearest for its own (up to ten times the wanted
-    /// one and eight resolutions), and no other of the same call is added within 0.7 of that: it is seen
-    /// first what the one has mended. Returns how many were added: 0 means that nothing more can be done.
+    /// Adds particles at the projections of `shortages` (where there is none, on the surface within half a
+    /// resolution, if that is there), in their order, at places that floats can hold: at least 0.7 of the
+    /// wanted spacing, or of that of the nearest particle, from those that face the same way. A particle that
+    /// was there before and is nearer is surrounded instead: its spacing becomes 0.6 of the smaller of its
+    /// own and the wanted one, down to `min_spacing` and `least`, and six more are added around it at that
+    /// distance, so that repeated calls get denser; where there is no place for any, as on what is smaller
+    /// than the ring, that becomes smaller still. Where there is room for more than the wanted spacing a
+    /// particle takes the distance to the nearest for its own (up to ten times the wanted one and eight
+    /// resolutions), and no other of the same call is added within 0.7 of that: it is seen first what the one
+    /// has mended. Returns how many were added: 0 means that nothing more can be done.
     std::size_t add(const std::vector<Shortage>& shortages);
 
 private:
@@ -65,7 +67,7 @@ private:
 
     Particles& particles_;
     const Surface& surface_;
-    double min_spacing_;
+    double min_spacing_, max_spacing_;
     std::size_t most_;
     Id& next_id_;
     std::unique_ptr<Surface::Probe> probe_;

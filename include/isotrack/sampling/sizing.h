@@ -37,6 +37,10 @@ struct SizingEvidence {
 double spacing_from_curvature(Surface::Probe& probe, const Vec3& p, const Vec3& n, double resolution,
                               const SizingLimits& limits);
 
+/// Of the particles whose error is known, the share of those that have more than hardly any, 0.15 of what is
+/// aimed at: nearly all on smooth surfaces, few where flat faces meet. 1 when none is known.
+double share_with_error(const SizingEvidence& evidence, const SizingLimits& limits);
+
 /// The paper's k_nd: sqrt(max over neighbours on the same side of (1 - n_i . n_j) / r_ij^2), 1 / world units.
 double normal_deviation(const Particles& particles, const Adjacency& adjacency, std::size_t i);
 
