@@ -206,6 +206,7 @@ int Densifier::add_or_nearest(const Vec3& place, double h) {
     if (!projected) projected = surface_near(*probe_, place, kNearEnough * surface_.resolution());
     if (!projected) return nearest;
     const Vec3 p = to_float_precision(*projected), n = probe_->normal(p);
+    if (!(n.squaredNorm() > 0.0)) return nearest;
     const double apart = kApart * h,
                  far = std::max(apart, std::min(kFar * h, kFarthest * surface_.resolution()));
     const double looked_at = std::max(far, kApart * widest_of_call_);

@@ -353,7 +353,8 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     frame.delaunay_strategy = name_of(strategy());
     const std::size_t relocated = dt->profile().relocated;
     const std::size_t before = particles.size();
-    const bool warm = !particles.empty();
+    const bool warm = !particles.empty(), as_in_paper = options.method == Method::Paper;
+    const double apart = as_in_paper ? kDenseSeeds : kSparseSeeds;
     const Id first_new = next_id;
     {
         const StageTimer timer(seconds, "carry");
@@ -366,10 +367,9 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     {
         const StageTimer timer(seconds, "cover");
         work->crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
-        if (warm) frame.seeded = cover(particles, surface, *work->crossings, l, options.seed, next_id);
+        if (warm) frame.seeded = cover(particles, surface, *work->crossings, l, options.seed, next_id, apart);
     }
-    const bool as_in_paper = options.method == Method::Paper;
-    if (!warm) seed(surface, *work->crossings, l, as_in_paper ? kDenseSeeds : kSparseSeeds, frame);
+    if (!warm) seed(surface, *work->crossings, l, apart, frame);
     if (as_in_paper)
         sample_as_in_paper(surface, l, warm, frame);
     else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))
@@ -384,7 +384,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         fitted.fit_vertices(mesh, particles.size(), surface);
     };
     const std::size_t crossing_count = work->crossings->size();
-    // As long as many particles have to be added their surroundings make room for them.
+    // Once, when many particles have to be added, their surroundings make room for them.
     std::size_t added = 0;
     std::optional<Densifier> densifier;  // none in the paper's method, which mends nothing
     inspector.emplace(surface, l, *work->crossings);

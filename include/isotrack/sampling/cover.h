@@ -17,9 +17,9 @@ constexpr double kDenseSeeds = 0.7;
 
 /// Adds particles where the surface has none near, until every crossing of the surface's lattice is covered:
 /// within reach of a particle that faces the same way and in whose tangent plane it nearly lies. With no
-/// particles at all this is the cold start: seeds at `apart` of their spacing or more from each other, in an
-/// order shuffled by `seed`. `crossings`: of the surface. Returns how many were added; new ids count on from
-/// `next_id`.
+/// particles at all this is the cold start: each seed covers `apart` of its spacing, so that on
+/// smooth surface no two are much nearer, in an order shuffled by `seed`. `crossings`: of the surface.
+/// Returns how many were added; new ids count on from `next_id`.
 std::size_t cover(Particles& particles, const Surface& surface, const CrossingGrid& crossings,
                   const SizingLimits& limits, std::uint64_t seed, Id& next_id, double apart = kSparseSeeds);
 
