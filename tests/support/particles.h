@@ -8,7 +8,9 @@
 #include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/sampling/adjacency.h"
 #include "isotrack/sampling/particles.h"
+#include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
+#include "isotrack/surface/shapes.h"
 
 namespace isotrack::support {
 
@@ -45,6 +47,14 @@ inline double nearest_distance(const Particles& particles, std::size_t i) {
 /// Along the tube of a torus around the third axis.
 inline Vec3 along_tube(const Vec3& p) {
     return Vec3(-p.y(), p.x(), 0.0).normalized();
+}
+
+/// Particles all over the unit sphere, well spread.
+inline Particles settled_on_unit_sphere(std::size_t count, double spacing) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    Particles particles = random_on_unit_sphere(count, spacing);
+    for (int sweep = 0; sweep < 20; ++sweep) relax(particles, adjacency_of(particles), *sphere, 1);
+    return particles;
 }
 
 }  // namespace isotrack::support
