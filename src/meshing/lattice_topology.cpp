@@ -6,9 +6,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <tuple>
 
+#include "disjoint_sets.h"
 #include "meshing/contested_nodes.h"
 #include "meshing/lattice_neighbours.h"
 #include "surface/thread_probes.h"
@@ -19,18 +19,13 @@ namespace {
 /// Triangles joined through common vertices. Components are numbered in the order of their first triangle.
 std::vector<int> component_of_triangles(std::size_t vertices, const std::vector<Triangle>& triangles,
                                         int& count) {
-    std::vector<int> parent(vertices);
-    std::iota(parent.begin(), parent.end(), 0);
-    const auto find = [&](int v) {
-        while (parent[v] != v) v = parent[v] = parent[parent[v]];
-        return v;
-    };
+    DisjointSets sets(vertices);
     for (const Triangle& t : triangles)
-        for (const int v : {t[1], t[2]}) parent[find(v)] = find(t[0]);
+        for (const int v : {t[1], t[2]}) sets.join(t[0], v);
     std::vector<int> number(vertices, -1), result;
     count = 0;
     for (const Triangle& t : triangles) {
-        int& n = number[find(t[0])];
+        int& n = number[sets.least(t[0])];
         if (n < 0) n = count++;
         result.push_back(n);
     }

@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numeric>
 #include <string>
 
+#include "disjoint_sets.h"
 #include "isotrack/error.h"
 
 namespace isotrack {
@@ -130,24 +130,11 @@ private:
 };
 
 std::size_t count_components(const TriangleMesh& mesh, std::size_t used_vertices) {
-    std::vector<int> parent(mesh.points.size());
-    std::iota(parent.begin(), parent.end(), 0);
-    const auto root = [&](int v) {
-        while (parent[v] != v) v = parent[v] = parent[parent[v]];
-        return v;
-    };
+    DisjointSets vertices(mesh.points.size());
     std::size_t components = used_vertices;
     for (const Triangle& t : mesh.triangles) {
         if (is_degenerate(t)) continue;
-        int a = root(t[0]);
-        for (int k = 1; k < 3; ++k) {
-            const int b = root(t[k]);
-            if (a == b) continue;
-            --components;
-            // The lower index wins: neighbours are mostly close in memory, and so are their roots.
-            parent[std::max(a, b)] = std::min(a, b);
-            a = std::min(a, b);
-        }
+        for (int k = 1; k < 3; ++k) components -= vertices.join(t[0], t[k]);
     }
     return components;
 }

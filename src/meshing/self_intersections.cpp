@@ -188,19 +188,30 @@ std::vector<std::pair<int, int>> self_intersections(const TriangleMesh& mesh) {
 
 bool any_cross(const std::vector<Vec3>& points, const std::vector<Triangle>& some,
                const std::vector<Triangle>& others) {
-    const auto box_of = [&](const Triangle& t) {
+    struct Boxed {
+        Box box;
+        const Triangle* triangle;
+    };
+    const auto boxed = [&](const Triangle& t) {
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-        return Box(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c));
+        return Boxed{Box(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)), &t};
     };
     const auto area = [&](const Triangle& t) { return has_area(points[t[0]], points[t[1]], points[t[2]]); };
-    for (auto t = some.begin(); t != some.end(); ++t) {
-        if (!area(*t)) continue;
-        const Box box = box_of(*t);
-        const auto is_crossed_by = [&](const Triangle& other) {
-            return box.intersects(box_of(other)) && area(other) && cross(points, *t, other);
+    std::vector<Boxed> ours, near;
+    Box bounds;
+    for (const Triangle& t : some)
+        if (area(t)) {
+            ours.push_back(boxed(t));
+            bounds.extend(ours.back().box);
+        }
+    for (const Triangle& t : others)
+        if (const Boxed other = boxed(t); bounds.intersects(other.box) && area(t)) near.push_back(other);
+    for (auto t = ours.begin(); t != ours.end(); ++t) {
+        const auto is_crossed_by = [&](const Boxed& other) {
+            return t->box.intersects(other.box) && cross(points, *t->triangle, *other.triangle);
         };
-        if (std::any_of(t + 1, some.end(), is_crossed_by) ||
-            std::any_of(others.begin(), others.end(), is_crossed_by))
+        if (std::any_of(t + 1, ours.end(), is_crossed_by) ||
+            std::any_of(near.begin(), near.end(), is_crossed_by))
             return true;
     }
     return false;

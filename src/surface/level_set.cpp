@@ -13,10 +13,12 @@
 #include <cstring>
 #include <limits>
 
+#include "disjoint_sets.h"
 #include "find_in_blocks.h"
 #include "isotrack/error.h"
 #include "surface/ambiguous_faces.h"
 #include "surface/crossed_edges.h"
+#include "surface/lattice_mesh.h"
 
 namespace isotrack {
 namespace {
@@ -550,11 +552,20 @@ std::vector<Eigen::Vector3i> LevelSet::upright_crossings() const {
         };
     });
 }
-std::optional<long> LevelSet::lattice_euler() const {
+std::optional<Surface::Numbers> LevelSet::lattice_numbers() const {
     std::vector<openvdb::Vec3s> points;
     std::vector<openvdb::Vec4I> quads;
     openvdb::tools::volumeToMesh(*impl_->grid, points, quads);
-    return static_cast<long>(points.size()) - static_cast<long>(quads.size());  // two edges for every quad
+    DisjointSets vertices(points.size());
+    std::size_t components = points.size();
+    for (const openvdb::Vec4I& q : quads)
+        for (int k = 1; k < 4; ++k)
+            components -= vertices.join(static_cast<int>(q[0]), static_cast<int>(q[k]));
+    const long euler = static_cast<long>(points.size()) - static_cast<long>(quads.size());
+    return Numbers{components, euler};  // two edges for every quad
+}
+TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reach) const {
+    return lattice_mesh_of(quadrangles_near(places, reach, volume_to_polygons(*impl_->grid, 0.0)), *this);
 }
 
 std::vector<Surface::Diagonal> LevelSet::diagonals() const {

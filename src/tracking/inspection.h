@@ -8,23 +8,17 @@
 
 #include "isotrack/meshing/certify.h"
 #include "isotrack/meshing/lattice_topology.h"
-#include "isotrack/meshing/manifold.h"
 #include "isotrack/sampling/particles.h"
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/sizing.h"
 #include "isotrack/tracking/tracker.h"
 #include "tracking/between_crossings.h"
 #include "tracking/facets.h"
+#include "tracking/frame_mesh.h"
 #include "tracking/mesh_distances.h"
 #include "tracking/triangle_index.h"
 
 namespace isotrack {
-
-struct FrameMesh {
-    CarvedSurface carved;
-    std::vector<Vec3> vertices;    ///< Of the mesh: fitted when asked for.
-    std::vector<Vec3> on_surface;  ///< The same vertices before the fit.
-};
 
 struct Inspection {
     std::shared_ptr<const std::vector<TriangleError>> errors;  ///< Per triangle; the inspector has them, too.

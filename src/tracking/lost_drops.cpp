@@ -79,31 +79,14 @@ bool is_sphere(const TriangleMesh& mesh) {
 /// Not where it would cross the mesh or is no sphere. Returns whether it did.
 bool put_in(TriangleMesh drop, FrameMesh& mesh) {
     if (!is_sphere(drop)) return false;
-    CarvedSurface& carved = mesh.carved;
-    Box box;
-    for (const Vec3& p : drop.points) box.extend(p);
-    std::vector<Triangle> near;
-    for (const Triangle& t : carved.triangles) {
-        Box of_triangle(mesh.vertices[t[0]]);
-        of_triangle.extend(mesh.vertices[t[1]]).extend(mesh.vertices[t[2]]);
-        if (box.intersects(of_triangle)) near.push_back(t);
-    }
     const std::size_t first = mesh.vertices.size();
     for (Triangle& t : drop.triangles)
         for (int& v : t) v += static_cast<int>(first);
-    const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
-    append(mesh.vertices, drop.points);
-    if (any_cross(mesh.vertices, drop.triangles, near)) {
-        mesh.vertices.resize(first);
-        return false;
-    }
-    append(mesh.on_surface, drop.points);
-    append(carved.midpoints, drop.points);
-    append(carved.triangles, drop.triangles);
-    carved.particle.resize(mesh.vertices.size(), -1);
-    carved.inside_cell.resize(carved.triangles.size(), CarvedSurface::kNoCell);
-    carved.inside_facet.resize(carved.triangles.size(), 0);
-    return true;
+    mesh.vertices.insert(mesh.vertices.end(), drop.points.begin(), drop.points.end());
+    const bool crosses = any_cross(mesh.vertices, drop.triangles, mesh.carved.triangles);
+    mesh.vertices.resize(first);
+    if (!crosses) append(mesh, drop.points, drop.triangles);
+    return !crosses;
 }
 
 }  // namespace

@@ -69,29 +69,6 @@ std::vector<int> way_from(const std::set<int>& part, const CellLabels& labels, c
     return {};
 }
 
-FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out) {
-    FrameMesh result = mesh;
-    CarvedSurface& carved = result.carved;
-    std::vector<char> keep;
-    for (const char flag : left_out) keep.push_back(!flag);
-    compact(carved.triangles, keep);
-    compact(carved.inside_cell, keep);
-    compact(carved.inside_facet, keep);
-    keep.assign(mesh.vertices.size(), 0);
-    for (const Triangle& t : carved.triangles)
-        for (const int v : t) keep[v] = 1;
-    compact(result.vertices, keep);
-    compact(result.on_surface, keep);
-    compact(carved.particle, keep);
-    carved.midpoints.clear();
-    for (std::size_t v = 0; v < carved.particle.size(); ++v)
-        if (carved.particle[v] < 0) carved.midpoints.push_back(result.on_surface[v]);
-    const std::vector<int> number = numbers_after(keep);
-    for (Triangle& t : carved.triangles)
-        for (int& v : t) v = number[v];
-    return result;
-}
-
 /// Takes the flags off what hangs together, within flagged triangles, with some of them.
 void spare_components_of(const std::vector<std::size_t>& some, const FrameMesh& mesh,
                          std::vector<char>& flags) {
@@ -163,8 +140,8 @@ bool any(const std::vector<char>& flags) {
 
 }  // namespace
 
-std::size_t join_specks(LabelTrials& trials, const Tetrahedra& cells, const Particles& particles,
-                        const Surface& surface, const SizingLimits& limits) {
+std::size_t join_specks(MeshTrials& trials, CellLabels& labels, const Carve& carve, const Tetrahedra& cells,
+                        const Particles& particles, const Surface& surface, const SizingLimits& limits) {
     const auto probe = surface.probe();
     // Those that something is near to which is missed without all of them.
     const auto needed = [&] {
@@ -178,12 +155,17 @@ std::size_t join_specks(LabelTrials& trials, const Tetrahedra& cells, const Part
     };
     const auto join = [&](const std::set<int>& part) {
         const MeshTopology now = topology_of(trials.mesh());
-        CellLabels changed = trials.labels();
+        CellLabels changed = labels;
         const auto way = way_from(part, changed, cells, particles, *probe, limits.tolerance);
+        if (way.empty()) return false;
         for (const int c : way) changed[c] = 1;
-        return !way.empty() && trials.try_labels(std::move(changed), true, [&](const MeshTopology& then) {
-            return then.components == now.components - 1 && then.euler == now.euler - 2;
-        });
+        FrameMesh other = carve(changed);
+        const MeshTopology then = topology_of(other);
+        if (then.components != now.components - 1 || then.euler != now.euler - 2 ||
+            !trials.try_mesh(std::move(other)))
+            return false;
+        labels = std::move(changed);
+        return true;
     };
     std::size_t joined = 0;
     std::set<int> refused;  // inside cells
@@ -193,7 +175,7 @@ std::size_t join_specks(LabelTrials& trials, const Tetrahedra& cells, const Part
             const auto t = std::find(speck.begin(), speck.end(), 1) - speck.begin();
             const int inside = trials.mesh().carved.inside_cell[t];
             if (inside == CarvedSurface::kNoCell || refused.count(inside) > 0) continue;
-            const std::set<int> part = inside_with(inside, trials.labels(), cells);
+            const std::set<int> part = inside_with(inside, labels, cells);
             if (part.size() < kMostCells && join(part)) {
                 more = ++joined < kMostSpecks;  // the triangles are others now
                 break;

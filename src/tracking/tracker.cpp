@@ -25,11 +25,11 @@
 #include "tracking/carry.h"
 #include "tracking/fitted.h"
 #include "tracking/frame_work.h"
-#include "tracking/handles.h"
 #include "tracking/inspection.h"
-#include "tracking/label_trials.h"
 #include "tracking/last_mesh.h"
 #include "tracking/lost_drops.h"
+#include "tracking/mesh_trials.h"
+#include "tracking/patches.h"
 #include "tracking/refinement.h"
 #include "tracking/relabelling.h"
 #include "tracking/specks.h"
@@ -414,27 +414,22 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     const bool refines = !options.fit && options.method == Method::Tolerance &&
                          options.reconstruction == Reconstruction::Guided &&
                          options.delaunay != UpdateStrategy::Rebuild;
-    const auto try_other_labels = [&] {
-        last_mesh.take(mesh.carved, particles, dt->cells());
-        const LabelTrials::Carve carve_labels = [&](CellLabels& of_cells) {
-            return mesh_of(of_cells, surface);
-        };
-        const LabelTrials::Fit fit_other = [&](FrameMesh& other) {
-            if (!options.fit) return;
-            Fitted its_own = fitted;
-            its_own.fit_vertices(other, particles.size(), surface);
-            its_own.undo_crossing(other, particles.size());
-        };
-        const bool guided =
-            options.method == Method::Tolerance && options.reconstruction == Reconstruction::Guided;
+    const bool guided =
+        options.method == Method::Tolerance && options.reconstruction == Reconstruction::Guided;
+    const auto mend_components = [&] {
         if (guided) {
-            LabelTrials of_labels(labels, mesh, inspection, *inspector, l, carve_labels, fit_other);
-            const std::size_t joined = join_specks(of_labels, dt->cells(), particles, surface, l);
-            if (mend_handles(of_labels, dt->cells(), particles, last_mesh.evidence.thickness, surface) +
-                    joined >
-                0)
-                last_mesh.take(mesh.carved, particles, dt->cells());
+            const Carve carve_labels = [&](CellLabels& of_cells) {
+                FrameMesh other = mesh_of(of_cells, surface);
+                if (!options.fit) return other;
+                Fitted its_own = fitted;
+                its_own.fit_vertices(other, particles.size(), surface);
+                its_own.undo_crossing(other, particles.size());
+                return other;
+            };
+            MeshTrials trials(mesh, inspection, *inspector, l);
+            join_specks(trials, labels, carve_labels, dt->cells(), particles, surface, l);
         }
+        last_mesh.take(mesh.carved, particles, dt->cells());
         const std::vector<std::vector<Vec3>> lost = inspection.topology.lost;
         remove_specks(mesh, inspection, *inspector, l);
         if (guided && !options.min_edge) put_in_drops(lost, mesh, inspection, *inspector, surface);
@@ -476,11 +471,18 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
             if (!between) inspector->look_between(mesh, inspection);
             inspector->inspect_topology(mesh, inspection);
             if (!passes()) continue;
-            try_other_labels();  // which may find more that is missed
+            mend_components();  // which may find more that is missed
             if (last || ++trials == kMostTrials || inspection.missed.empty() ||
                 mend(mesh, inspection, surface, l, *densifier) == 0)
                 break;
         }
+    }
+    if (guided && !options.min_edge) {
+        const StageTimer timer(seconds, "certify");
+        if (inspection.topology.speck.size() != mesh.carved.triangles.size())
+            inspector->inspect_topology(mesh, inspection);
+        MeshTrials of_mesh(mesh, inspection, *inspector, l);
+        patch_topology(of_mesh, last_mesh.evidence.thickness, surface);
     }
     frame.relocated += dt->profile().relocated - relocated;
     inherit_velocities(particle_triangles(mesh.carved), first_new);

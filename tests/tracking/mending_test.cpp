@@ -17,10 +17,10 @@
 #include "surface/cell_points.h"
 #include "surface/float_precision.h"
 #include "tracking/failing.h"
-#include "tracking/handles.h"
 #include "tracking/inspection.h"
 #include "tracking/lost_drops.h"
 #include "tracking/mesh_distances.h"
+#include "tracking/patches.h"
 #include "tracking/refitted.h"
 #include "tracking/relabelling.h"
 #include "tracking/specks.h"
@@ -57,7 +57,7 @@ struct Carved {
         result.on_surface = result.vertices;
         return result;
     }
-    LabelTrials::Carve carve_labels() {
+    Carve carve_labels() {
         return [this](CellLabels& of_cells) {
             labels = of_cells;
             return mesh();
@@ -298,21 +298,18 @@ TEST(MeshDistances, AfterChangesAreThoseMeasuredAnew) {
 
 INSTANTIATE_TEST_SUITE_P(Tolerances, RefitOfABox, ::testing::Values(0.02, 0.05, 0.2));
 
-/// A mesh, its inspection with all that there is to look at, and trials of other labels.
+/// A mesh, its inspection with all that there is to look at, and trials of others.
 struct Inspected {
     CrossingGrid crossings;
     Inspector inspector;
     Inspection inspection;
-    CellLabels labels;
-    LabelTrials trials;
+    MeshTrials trials;
 
-    Inspected(Carved& carved, FrameMesh& mesh)
+    Inspected(const Carved& carved, FrameMesh& mesh)
         : crossings(carved.surface),
           inspector(carved.surface, carved.limits, crossings),
           inspection(inspector.inspect_both_ways(mesh)),
-          labels(carved.labels),
-          trials(labels, mesh, inspection, inspector, carved.limits, carved.carve_labels(),
-                 [](FrameMesh&) {}) {
+          trials(mesh, inspection, inspector, carved.limits) {
         inspector.look_between(mesh, inspection);
         inspector.inspect_topology(mesh, inspection);
     }
@@ -334,27 +331,54 @@ openvdb::FloatGrid::Ptr thin_disk_and_ball() {
     return grid;
 }
 
-TEST(Handles, FillsAHoleInAThinSheet) {
-    const LevelSet disk(thin_disk_and_ball());
-    ASSERT_EQ(disk.lattice_euler(), 4);
-    Carved carved(disk, 0.5, 0.8);
-    const auto euler = [](const FrameMesh& mesh) {
-        return mesh_topology({mesh.vertices, mesh.carved.triangles, {}, {}}).euler;
-    };
-    ASSERT_EQ(euler(carved.mesh()), 4);
-    const CellLabels right = carved.labels;
-    for (int c = 0; c < static_cast<int>(right.size()); ++c)
-        if (right[c] && (carved.centroid(c) - Vec3(0.5, 0.5, 0.0)).norm() < 0.6) carved.labels[c] = 0;
+/// Takes cells near a place out of a surface's mesh, which gets that other Euler number, then patches it.
+void expect_patched(const openvdb::FloatGrid::Ptr& grid, const Vec3& place, double radius, long without) {
+    const LevelSet surface(grid);
+    const auto lattice = surface.lattice_numbers();
+    ASSERT_TRUE(lattice.has_value());
+    Carved carved(surface, 0.5, 0.8);
+    ASSERT_EQ(topology_of(carved.mesh()).euler, lattice->euler);
+    for (int c = 0; c < static_cast<int>(carved.labels.size()); ++c)
+        if (carved.labels[c] && (carved.centroid(c) - place).norm() < radius) carved.labels[c] = 0;
     FrameMesh mesh = carved.mesh();
-    ASSERT_EQ(euler(mesh), 2);
+    ASSERT_EQ(topology_of(mesh).euler, without);
+    ASSERT_EQ(topology_of(mesh).components, lattice->components);
 
     Inspected now(carved, mesh);
     const std::vector<double> thickness(carved.particles.size(), 0.3);
-    EXPECT_EQ(mend_handles(now.trials, carved.cells, carved.particles, thickness, disk), 1u);
-    EXPECT_EQ(euler(mesh), 4);
-    EXPECT_EQ(euler(carved.carve_labels()(now.labels)), 4);
-    // Now there is nothing to mend.
-    EXPECT_EQ(mend_handles(now.trials, carved.cells, carved.particles, thickness, disk), 0u);
+    EXPECT_EQ(patch_topology(now.trials, thickness, surface), 1u);
+    const MeshTopology topology = topology_of(mesh);
+    EXPECT_EQ(topology.euler, lattice->euler);
+    EXPECT_EQ(topology.components, lattice->components);
+    EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
+    EXPECT_TRUE(self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}).empty());
+    EXPECT_EQ(mesh.on_surface.size(), mesh.vertices.size());
+    EXPECT_EQ(mesh.carved.particle.size(), mesh.vertices.size());
+    EXPECT_EQ(mesh.carved.inside_cell.size(), mesh.carved.triangles.size());
+    // Now there is nothing to patch.
+    EXPECT_EQ(patch_topology(now.trials, thickness, surface), 0u);
+}
+
+TEST(Patches, FillAHoleInAThinSheet) {
+    expect_patched(thin_disk_and_ball(), {0.5, 0.5, 0.0}, 0.6, 2);
+}
+
+/// A ring of about a voxel and a half across.
+openvdb::FloatGrid::Ptr thin_ring() {
+    auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    auto values = grid->getAccessor();
+    for (int x = -13; x <= 13; ++x)
+        for (int y = -13; y <= 13; ++y)
+            for (int z = -6; z <= 6; ++z) {
+                const double ring = std::hypot(std::hypot(x + 0.2, y - 0.1) - 7.3, z + 0.1) - 0.85;
+                values.setValue({x, y, z}, static_cast<float>(std::min(ring, 3.0)));
+            }
+    return grid;
+}
+
+TEST(Patches, CloseARingThatIsCut) {
+    expect_patched(thin_ring(), {7.0, 0.0, 0.0}, 0.9, 2);
 }
 
 /// A ball with a spike of one line of nodes.
@@ -394,7 +418,9 @@ void cut_a_spike(const std::vector<double>& at, double tolerance, std::size_t jo
         if (x > 8.5 && x < 10.5) continue;
         EXPECT_EQ(now.inspection.topology.speck[t] != 0, x > 9.5);
     }
-    EXPECT_EQ(join_specks(now.trials, carved.cells, carved.particles, surface, carved.limits), joined);
+    EXPECT_EQ(join_specks(now.trials, carved.labels, carved.carve_labels(), carved.cells, carved.particles,
+                          surface, carved.limits),
+              joined);
     remove_specks(mesh, now.inspection, now.inspector, carved.limits);
     EXPECT_EQ(topology(mesh).components, 1u);
     EXPECT_EQ(topology(mesh).euler, 2);

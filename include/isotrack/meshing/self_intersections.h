@@ -16,8 +16,8 @@ namespace isotrack {
 /// finite, or a triangle with an index outside `points`.
 std::vector<std::pair<int, int>> self_intersections(const TriangleMesh& mesh);
 
-/// Whether a triangle of `some` makes a pair with another of them or with one of `others`. For a few:
-/// compares all with all.
+/// Whether a triangle of `some` makes a pair with another of them or with one of `others`. For a few in
+/// `some`: compares all with all of those and of what is near them.
 bool any_cross(const std::vector<Vec3>& points, const std::vector<Triangle>& some,
                const std::vector<Triangle>& others);
 

@@ -95,9 +95,19 @@ public:
 
     /// Those of a surface that says how nodes are joined; this default has none.
     virtual std::vector<Diagonal> diagonals() const { return {}; }
-    /// The Euler number of the surface that parts the lattice nodes, one vertex or more per cell, joined as
-    /// `diagonals` says; this default does not know it. Takes as long as meshing every cell.
-    virtual std::optional<long> lattice_euler() const { return std::nullopt; }
+    /// The surface that parts the lattice nodes, joined as `diagonals` says: closed, with vertices at each
+    /// crossing, in every cell that it passes through and on the faces between, all near the surface if not
+    /// on it. Parts of it within one cell may cross. At least what is in cubes around some places, `reach`
+    /// to each side, and open beyond. This default has none.
+    virtual TriangleMesh lattice_mesh(const std::vector<Vec3>& /*places*/, double /*reach*/) const {
+        return {};
+    }
+    struct Numbers {
+        std::size_t components;
+        long euler;
+    };
+    /// Of that mesh, for a part of its price.
+    virtual std::optional<Numbers> lattice_numbers() const { return std::nullopt; }
 };
 
 }  // namespace isotrack

@@ -1,0 +1,136 @@
+#include "surface/lattice_mesh.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <tuple>
+
+#include "surface/float_precision.h"
+#include "surface/thread_probes.h"
+
+namespace isotrack {
+namespace {
+
+/// Where the lattice edge that the four cells around are common to crosses the surface. `cells`: their
+/// lowest corners. nullopt where they are not around an edge that does.
+std::optional<Vec3> crossing_amid(const Vec3 (&cells)[4], const Eigen::Affine3d& lattice,
+                                  Surface::Probe& probe) {
+    const Vec3 low = cells[0].cwiseMin(cells[1]).cwiseMin(cells[2]).cwiseMin(cells[3]),
+               high = cells[0].cwiseMax(cells[1]).cwiseMax(cells[2]).cwiseMax(cells[3]),
+               middle = 0.25 * (cells[0] + cells[1] + cells[2] + cells[3]);
+    int axis = -1;
+    for (int k = 0; k < 3; ++k) {
+        if (high[k] == low[k] && axis < 0)
+            axis = k;
+        else if (high[k] != low[k] + 1.0 || middle[k] != low[k] + 0.5)
+            return std::nullopt;
+    }
+    if (axis < 0) return std::nullopt;
+    const Vec3 from = lattice * high, to = lattice * Vec3(high + Vec3::Unit(axis));
+    const double a = probe.value(from), b = probe.value(to);
+    if ((a < 0.0) == (b < 0.0)) return std::nullopt;
+    return from + a / (a - b) * (to - from);
+}
+
+/// An edge of a quadrangle, between two cells.
+struct CellEdge {
+    int low, high;  // corners
+    int quadrangle, k;
+    bool operator<(const CellEdge& o) const {
+        return std::tie(low, high, quadrangle, k) < std::tie(o.low, o.high, o.quadrangle, o.k);
+    }
+};
+
+std::vector<CellEdge> cell_edges(const PolygonMesh& quadrangles) {
+    std::vector<CellEdge> result;
+    result.reserve(4 * quadrangles.quads.size());
+    for (std::size_t q = 0; q < quadrangles.quads.size(); ++q)
+        for (int k = 0; k < 4; ++k) {
+            const int a = quadrangles.quads[q][k], b = quadrangles.quads[q][(k + 1) % 4];
+            result.push_back({std::min(a, b), std::max(a, b), static_cast<int>(q), k});
+        }
+    std::sort(result.begin(), result.end());
+    return result;
+}
+
+}  // namespace
+
+PolygonMesh quadrangles_near(const std::vector<Vec3>& places, double reach, const PolygonMesh& quadrangles) {
+    std::vector<char> near(quadrangles.points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, near.size(), 1024), [&](const auto& range) {
+        for (std::size_t v = range.begin(); v < range.end(); ++v)
+            near[v] = std::any_of(places.begin(), places.end(), [&](const Vec3& place) {
+                return (quadrangles.points[v] - place).lpNorm<Eigen::Infinity>() <= reach;
+            });
+    });
+    PolygonMesh result;
+    std::vector<int> number(near.size(), -1);
+    for (const auto& q : quadrangles.quads) {
+        if (std::none_of(q.begin(), q.end(), [&](int v) { return near[v] != 0; })) continue;
+        result.quads.push_back(q);
+        for (int& v : result.quads.back()) {
+            if (number[v] < 0) {
+                number[v] = static_cast<int>(result.points.size());
+                result.points.push_back(quadrangles.points[v]);
+            }
+            v = number[v];
+        }
+    }
+    return result;
+}
+
+TriangleMesh lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surface) {
+    const Eigen::Affine3d lattice = surface.lattice(), to_lattice = lattice.inverse();
+    const auto cell_of = [&](const Vec3& p) -> Vec3 { return (to_lattice * p).array().floor(); };
+    const auto& in_cell = quadrangles.points;
+    const std::size_t cells = in_cell.size(), quads = quadrangles.quads.size();
+    ThreadProbes probes(surface);
+    TriangleMesh mesh;
+    mesh.points = in_cell;
+    mesh.points.resize(cells + quads);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells, 256), [&](const auto& range) {
+        Surface::Probe& probe = probes.local();
+        for (std::size_t v = range.begin(); v < range.end(); ++v)
+            if (const auto p = probe.project(in_cell[v]); p && cell_of(*p) == cell_of(in_cell[v]))
+                mesh.points[v] = *p;
+    });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, quads, 256), [&](const auto& range) {
+        for (std::size_t q = range.begin(); q < range.end(); ++q) {
+            const auto& [i, j, k, l] = quadrangles.quads[q];
+            mesh.points[cells + q] =
+                crossing_amid(
+                    {cell_of(in_cell[i]), cell_of(in_cell[j]), cell_of(in_cell[k]), cell_of(in_cell[l])},
+                    lattice, probes.local())
+                    .value_or(0.25 * (in_cell[i] + in_cell[j] + in_cell[k] + in_cell[l]));
+        }
+    });
+    // The two quadrangles of an edge are around crossings on one face of both cells; between these it passes.
+    std::vector<std::array<int, 4>> on_face(quads);
+    const std::vector<CellEdge> edges = cell_edges(quadrangles);
+    for (std::size_t e = 0; e < edges.size(); ++e) {
+        const CellEdge& one = edges[e];
+        Vec3 middle = mesh.points[cells + one.quadrangle];
+        on_face[one.quadrangle][one.k] = static_cast<int>(mesh.points.size());
+        if (e + 1 < edges.size() && one.low == edges[e + 1].low && one.high == edges[e + 1].high) {
+            const CellEdge& other = edges[++e];
+            middle = 0.5 * (middle + mesh.points[cells + other.quadrangle]);
+            on_face[other.quadrangle][other.k] = on_face[one.quadrangle][one.k];
+        }
+        mesh.points.push_back(middle);
+    }
+    mesh.triangles.reserve(8 * quads);
+    for (std::size_t q = 0; q < quads; ++q)
+        for (int k = 0; k < 4; ++k) {
+            const int a = quadrangles.quads[q][k], b = quadrangles.quads[q][(k + 1) % 4], f = on_face[q][k],
+                      crossing = static_cast<int>(cells + q);
+            mesh.triangles.push_back({a, f, crossing});
+            mesh.triangles.push_back({f, b, crossing});
+        }
+    for (Vec3& p : mesh.points) p = to_float_precision(p);
+    return mesh;
+}
+
+}  // namespace isotrack

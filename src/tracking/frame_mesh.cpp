@@ -1,0 +1,40 @@
+#include "tracking/frame_mesh.h"
+
+#include "sampling/compact.h"
+
+namespace isotrack {
+
+FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out) {
+    FrameMesh result = mesh;
+    CarvedSurface& carved = result.carved;
+    std::vector<char> keep;
+    for (const char flag : left_out) keep.push_back(!flag);
+    compact(carved.triangles, keep);
+    compact(carved.inside_cell, keep);
+    compact(carved.inside_facet, keep);
+    keep.assign(mesh.vertices.size(), 0);
+    for (const Triangle& t : carved.triangles)
+        for (const int v : t) keep[v] = 1;
+    compact(result.vertices, keep);
+    compact(result.on_surface, keep);
+    compact(carved.particle, keep);
+    carved.midpoints.clear();
+    for (std::size_t v = 0; v < carved.particle.size(); ++v)
+        if (carved.particle[v] < 0) carved.midpoints.push_back(result.on_surface[v]);
+    const std::vector<int> number = numbers_after(keep);
+    for (Triangle& t : carved.triangles)
+        for (int& v : t) v = number[v];
+    return result;
+}
+
+void append(FrameMesh& mesh, const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
+    CarvedSurface& carved = mesh.carved;
+    for (auto* to : {&mesh.vertices, &mesh.on_surface, &carved.midpoints})
+        to->insert(to->end(), points.begin(), points.end());
+    carved.triangles.insert(carved.triangles.end(), triangles.begin(), triangles.end());
+    carved.particle.resize(mesh.vertices.size(), -1);
+    carved.inside_cell.resize(carved.triangles.size(), CarvedSurface::kNoCell);
+    carved.inside_facet.resize(carved.triangles.size(), 0);
+}
+
+}  // namespace isotrack

@@ -1,0 +1,22 @@
+// A frame's mesh as it is worked on.
+#pragma once
+
+#include <vector>
+
+#include "isotrack/meshing/manifold.h"
+
+namespace isotrack {
+
+struct FrameMesh {
+    CarvedSurface carved;
+    std::vector<Vec3> vertices;    ///< Of the mesh: fitted when asked for.
+    std::vector<Vec3> on_surface;  ///< The same vertices before the fit.
+};
+
+/// The mesh less the flagged triangles and the vertices that none has then.
+FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out);
+
+/// Adds vertices that stand on no particle, and triangles, which are no facets.
+void append(FrameMesh& mesh, const std::vector<Vec3>& points, const std::vector<Triangle>& triangles);
+
+}  // namespace isotrack

@@ -1,0 +1,36 @@
+// Other meshes instead of the last one of a frame.
+#pragma once
+
+#include "isotrack/meshing/mesh_topology.h"
+#include "isotrack/sampling/sizing.h"
+#include "tracking/inspection.h"
+
+namespace isotrack {
+
+/// A mesh and its inspection, with what lies between crossings and the topology. What is tried stays where
+/// it does no harm. All references must outlive it.
+class MeshTrials {
+public:
+    MeshTrials(FrameMesh& mesh, Inspection& inspection, Inspector& inspector, const SizingLimits& limits)
+        : mesh_(mesh), inspection_(inspection), inspector_(inspector), limits_(limits) {}
+
+    const FrameMesh& mesh() const { return mesh_; }
+    const Inspection& inspection() const { return inspection_; }
+    /// It saw the mesh last.
+    Inspector& inspector() { return inspector_; }
+
+    /// Takes a mesh if it misses nothing that the one there does not, and if its largest error is within the
+    /// tolerance or no larger. Returns whether it did.
+    bool try_mesh(FrameMesh other);
+
+private:
+    FrameMesh& mesh_;
+    Inspection& inspection_;
+    Inspector& inspector_;
+    const SizingLimits& limits_;
+};
+
+/// Of the triangles.
+MeshTopology topology_of(const FrameMesh& mesh);
+
+}  // namespace isotrack

@@ -1,0 +1,114 @@
+#include "tracking/patches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "isotrack/meshing/self_intersections.h"
+#include "meshing/patch.h"
+#include "meshing/small_handles.h"
+#include "sampling/compact.h"
+
+namespace isotrack {
+namespace {
+
+// All in resolutions.
+constexpr double kSmall = 3.5;  // reach of the pieces of the mesh that are looked at
+constexpr double kThin = 2.0;   // sheets no farther apart
+constexpr double kApart = 1.5;  // places that near are one
+constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
+constexpr double kLatticeReach = 24.0;
+constexpr std::size_t kMostWork = 20000000;  // triangles looked at, each as often as it is
+
+/// Those of some places that are not near to one before.
+std::vector<Vec3> apart(const std::vector<Vec3>& places, double distance) {
+    std::vector<Vec3> result;
+    for (const Vec3& place : places)
+        if (std::none_of(result.begin(), result.end(),
+                         [&](const Vec3& other) { return (other - place).norm() < distance; }))
+            result.push_back(place);
+    return result;
+}
+
+/// Where the mesh may have another topology than the lattice.
+std::vector<Vec3> suspicious_places(const FrameMesh& mesh, const LatticeTopology& topology,
+                                    const std::vector<double>& thickness, double resolution) {
+    std::vector<Vec3> result = topology.faults;
+    for (const auto& diagonal : topology.parted) result.push_back(0.5 * (diagonal.from + diagonal.to));
+    for (std::size_t t = 0; t < topology.speck.size(); ++t)
+        if (topology.speck[t]) result.push_back(mesh.vertices[mesh.carved.triangles[t][0]]);
+    std::vector<char> at_thin;
+    for (const int p : mesh.carved.particle) at_thin.push_back(p >= 0 && thickness[p] < kThin * resolution);
+    for (const int v : small_handles(mesh.vertices, mesh.carved.triangles, at_thin, kSmall * resolution))
+        result.push_back(mesh.vertices[v]);
+    return apart(result, kApart * resolution);
+}
+
+FrameMesh patched(FrameMesh mesh, const Patch& patch) {
+    append(mesh, patch.points, patch.triangles);
+    std::vector<char> gone = patch.gone;
+    gone.resize(mesh.carved.triangles.size(), 0);
+    return without(mesh, gone);
+}
+
+/// Whether a patch crosses the rest of its mesh or itself.
+bool crosses(const Patch& patch, const FrameMesh& mesh) {
+    std::vector<Vec3> points = mesh.vertices;
+    points.insert(points.end(), patch.points.begin(), patch.points.end());
+    std::vector<char> stays;
+    for (const char gone : patch.gone) stays.push_back(!gone);
+    std::vector<Triangle> rest = mesh.carved.triangles;
+    compact(rest, stays);
+    return any_cross(points, patch.triangles, rest);
+}
+
+}  // namespace
+
+std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface) {
+    const double resolution = surface.resolution();
+    const std::vector<Vec3> places =
+        suspicious_places(trials.mesh(), trials.inspection().topology, thickness, resolution);
+    if (places.empty()) return 0;
+    const auto wanted = surface.lattice_numbers();
+    if (!wanted) return 0;
+    // Components and handles that are too many or too few.
+    const auto astray = [&](const FrameMesh& mesh) {
+        const MeshTopology topology = topology_of(mesh);
+        const long components =
+                       static_cast<long>(topology.components) - static_cast<long>(wanted->components),
+                   handles = components - (topology.euler - wanted->euler) / 2;
+        return std::abs(components) + std::abs(handles);
+    };
+    long now = astray(trials.mesh());
+    if (now == 0) return 0;
+    const TriangleMesh lattice = surface.lattice_mesh(places, kLatticeReach * resolution);
+    std::size_t count = 0, work = 0;
+    std::vector<Vec3> around;  // places where a patch would be right, but did not fit
+    const auto patch_at = [&](const Vec3& place, double reach) {
+        const auto patch = patch_around(place, reach, trials.mesh().vertices, trials.mesh().carved.triangles,
+                                        lattice, resolution);
+        work += trials.mesh().carved.triangles.size();
+        if (!patch || patch->euler == 0) return;
+        FrameMesh other = patched(trials.mesh(), *patch);
+        const long then = astray(other);
+        if (then >= now) return;
+        if (crosses(*patch, trials.mesh()) || !trials.try_mesh(std::move(other))) {
+            for (const Vec3& v : trials.mesh().vertices)
+                if ((v - place).norm() < reach) around.push_back(v);
+            return;
+        }
+        ++count;
+        now = then;
+    };
+    const auto patch_near = [&](const std::vector<Vec3>& some) {
+        for (const double reach : kReaches)
+            for (const Vec3& place : some)
+                if (now > 0 && work < kMostWork) patch_at(place, reach * resolution);
+    };
+    patch_near(places);
+    patch_near(apart(std::exchange(around, {}), kApart * resolution));
+    return count;
+}
+
+}  // namespace isotrack

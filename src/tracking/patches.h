@@ -1,0 +1,17 @@
+// Parts of a frame's mesh that have another topology than the lattice of its surface.
+#pragma once
+
+#include <vector>
+
+#include "tracking/mesh_trials.h"
+
+namespace isotrack {
+
+/// For a surface that knows its `lattice_numbers`. While the mesh has other numbers of components or handles:
+/// around places where mesh and lattice disagree, or where sheets are thin, parts of the mesh are exchanged
+/// for those of the lattice mesh, small ones first, where that brings the numbers nearer and crosses nothing.
+/// `thickness`: per particle, the distance to the next sheet. New vertices stand on no particle, new
+/// triangles are no facets. Returns how many parts were exchanged.
+std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface);
+
+}  // namespace isotrack

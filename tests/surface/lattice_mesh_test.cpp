@@ -1,0 +1,156 @@
+#include "surface/lattice_mesh.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+#include <set>
+
+#include "isotrack/compare/baselines.h"
+#include "isotrack/meshing/mesh_topology.h"
+#include "isotrack/surface/level_set.h"
+#include "surface/float_precision.h"
+
+namespace isotrack {
+namespace {
+
+constexpr int kHalf = 10;
+
+/// Values of a function at the nodes of a cube, outside around it.
+template <typename Value>
+LevelSet cube_of(const Value& value, const Vec3& voxel = Vec3::Ones()) {
+    auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    openvdb::Mat4d to_world = openvdb::Mat4d::identity();
+    for (int k = 0; k < 3; ++k) to_world[k][k] = voxel[k];
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(to_world));
+    auto values = grid->getAccessor();
+    for (int x = -kHalf; x <= kHalf; ++x)
+        for (int y = -kHalf; y <= kHalf; ++y)
+            for (int z = -kHalf; z <= kHalf; ++z) {
+                const bool border = std::max({std::abs(x), std::abs(y), std::abs(z)}) == kHalf;
+                values.setValue({x, y, z},
+                                border ? 3.0f : static_cast<float>(std::clamp(value(x, y, z), -3.0, 3.0)));
+            }
+    return LevelSet(grid);
+}
+
+/// Inside nodes strewn at random: faces of all kinds, crumbs, tunnels.
+LevelSet strewn(unsigned seed, double share) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(0.0, 1.0);
+    return cube_of([&](int, int, int) {
+        const double size = 0.1 + 0.8 * uniform(random);
+        return uniform(random) < share ? -size : size;
+    });
+}
+
+const std::vector<Vec3> kAll = {Vec3::Zero()};
+constexpr double kFarReach = 1000.0;
+
+void expect_as_volume_to_mesh(const LevelSet& level_set) {
+    const TriangleMesh mesh = level_set.lattice_mesh(kAll, kFarReach);
+    const MeshTopology ours = mesh_topology(mesh), theirs = mesh_topology(volume_to_mesh(level_set));
+    EXPECT_TRUE(ours.closed() && ours.oriented());
+    EXPECT_EQ(ours.components, theirs.components);
+    EXPECT_EQ(ours.euler, theirs.euler);
+    const auto numbers = level_set.lattice_numbers();
+    ASSERT_TRUE(numbers.has_value());
+    EXPECT_EQ(numbers->components, theirs.components);
+    EXPECT_EQ(numbers->euler, theirs.euler);
+}
+
+using Place = std::array<double, 3>;
+std::set<Place> places_of(const std::vector<Vec3>& points) {
+    std::set<Place> result;
+    for (const Vec3& p : points) result.insert({p.x(), p.y(), p.z()});
+    return result;
+}
+
+/// Every crossing is a vertex, and every triangle stays within a cell.
+void expect_within_cells(const LevelSet& level_set) {
+    const TriangleMesh mesh = level_set.lattice_mesh(kAll, kFarReach);
+    const std::set<Place> vertices = places_of(mesh.points);
+    for (const auto& crossing : level_set.crossings()) {
+        const Vec3 p = to_float_precision(crossing.point);
+        const double h = 1e-5;  // both are rounded
+        const auto near = vertices.lower_bound({p.x() - h, -1e9, -1e9});
+        EXPECT_TRUE(std::any_of(near, vertices.upper_bound({p.x() + h, 1e9, 1e9}),
+                                [&](const Place& v) { return (Vec3(v[0], v[1], v[2]) - p).norm() < h; }));
+    }
+    const Eigen::Affine3d to_lattice = level_set.lattice().inverse();
+    for (const Triangle& t : mesh.triangles) {
+        Box box;
+        for (const int v : t) box.extend(Vec3(to_lattice * mesh.points[v]));
+        const Vec3 cell = box.center().array().floor();
+        constexpr double kRounded = 1e-5;
+        EXPECT_TRUE(((box.min() - cell).array() > -kRounded).all() &&
+                    ((box.max() - cell).array() < 1.0 + kRounded).all());
+    }
+}
+
+TEST(LatticeMesh, OfABallIsOnIt) {
+    const Vec3 centre(0.3, -0.2, 0.1);
+    const LevelSet ball = cube_of([&](int x, int y, int z) { return (Vec3(x, y, z) - centre).norm() - 7.3; });
+    expect_as_volume_to_mesh(ball);
+    expect_within_cells(ball);
+    const TriangleMesh mesh = ball.lattice_mesh(kAll, kFarReach);
+    double farthest = 0.0, sum = 0.0;
+    for (const Vec3& p : mesh.points) {
+        farthest = std::max(farthest, std::abs((p - centre).norm() - 7.3));
+        sum += std::abs((p - centre).norm() - 7.3);
+    }
+    EXPECT_LT(farthest, 0.05);  // what interpolation and the chords of faces leave
+    EXPECT_LT(sum / static_cast<double>(mesh.points.size()), 0.02);
+    const double pi = std::acos(-1.0), area = 4.0 * pi * 7.3 * 7.3;
+    EXPECT_NEAR(enclosed_volume(mesh), area * 7.3 / 3.0, 0.03 * area);
+}
+
+TEST(LatticeMesh, HasTheTopologyOfVolumeToMeshWhateverTheNodesAre) {
+    for (const double share : {0.05, 0.3, 0.5, 0.8})
+        for (unsigned seed = 0; seed < 5; ++seed) {
+            const LevelSet level_set = strewn(seed, share);
+            expect_as_volume_to_mesh(level_set);
+            expect_within_cells(level_set);
+        }
+}
+
+TEST(LatticeMesh, FacesOutwardInMirroredAndStretchedLattices) {
+    const auto ball = [](int x, int y, int z) { return Vec3(x, y, z).norm() - 6.2; };
+    for (const Vec3& voxel : {Vec3(0.5, 0.5, 0.5), Vec3(-1, 1, 1), Vec3(1, 2, 0.7), Vec3(-1, -2, -1)}) {
+        const LevelSet level_set = cube_of(ball, voxel);
+        expect_as_volume_to_mesh(level_set);
+        EXPECT_GT(enclosed_volume(level_set.lattice_mesh(kAll, kFarReach)), 0.0);
+    }
+}
+
+TEST(LatticeMesh, OfSomePlacesIsAPartOfTheWhole) {
+    const LevelSet level_set = strewn(3, 0.4);
+    const std::vector<Vec3> places = {Vec3(-4, 2, 1), Vec3(5, 5, -6)};
+    constexpr double kReach = 3.0;
+    const auto triangles_in = [&](const TriangleMesh& mesh) {
+        std::multiset<std::array<double, 9>> result;
+        for (const Triangle& t : mesh.triangles) {
+            std::array<double, 9> place;
+            bool in = false;
+            for (int k = 0; k < 3; ++k)
+                for (int c = 0; c < 3; ++c) place[3 * k + c] = mesh.points[t[k]][c];
+            for (const Vec3& p : places)
+                in = in || (Vec3(place[0], place[1], place[2]) - p).lpNorm<Eigen::Infinity>() < kReach - 1.0;
+            if (in) result.insert(place);
+        }
+        return result;
+    };
+    const TriangleMesh part = level_set.lattice_mesh(places, kReach),
+                       all = level_set.lattice_mesh(kAll, kFarReach);
+    EXPECT_EQ(triangles_in(part), triangles_in(all));
+    EXPECT_FALSE(triangles_in(part).empty());
+    EXPECT_LT(part.triangles.size(), all.triangles.size() / 4);
+    EXPECT_TRUE(level_set.lattice_mesh({}, kReach).empty());
+}
+
+}  // namespace
+}  // namespace isotrack
