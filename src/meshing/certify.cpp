@@ -40,7 +40,7 @@ void climb(Surface::Probe& probe, const Vec3& a, const Vec3& ab, const Vec3& ac,
         for (const auto& d : kDirections) {
             const double u = from.u + step * d[0], v = from.v + step * d[1];
             if (u < 0.0 || v < 0.0 || u + v > 1.0) continue;
-            const double distance = sign * probe.value(a + u * ab + v * ac);
+            const double distance = sign * probe.farther_value(a + u * ab + v * ac);
             if (distance > best.distance) best = {u, v, distance};
         }
     }
@@ -56,7 +56,7 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
     for (int i = 0; i <= steps; ++i)
         for (int j = 0; i + j <= steps; ++j) {
             const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
-            const double value = probe.value(a + u * (b - a) + v * (c - a));
+            const double value = probe.farther_value(a + u * (b - a) + v * (c - a));
             error.mean_square += value * value;
             ++count;
             if (value > outside.distance) outside = {u, v, value};

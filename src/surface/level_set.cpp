@@ -141,7 +141,11 @@ class Stencil {
 public:
     explicit Stencil(const FloatTree& tree) : nodes_(tree) {}
 
-    double value(const Vec3& index) {
+    /// Of an ambiguous cell also without what joins its nodes, where that is farther on the same side.
+    struct Value {
+        double joined, farther;
+    };
+    Value value(const Vec3& index) {
         Vec3 t;
         const Coord base = split(index, t);
         float v[2][2][2];
@@ -151,9 +155,12 @@ public:
         for (int i = 0; i < 2; ++i)
             planes[i] = mix(mix(v[i][0][0], v[i][0][1], t.z()), mix(v[i][1][0], v[i][1][1], t.z()), t.y());
         const double trilinear = mix(planes[0], planes[1], t.x());
-        if (!has_ambiguous_face(v)) return trilinear;
-        return trilinear +
-               joining_correction([&](int i, int j, int k) { return nodes_.at(base.offsetBy(i, j, k)); }, t);
+        if (!has_ambiguous_face(v)) return {trilinear, trilinear};
+        const double joined =
+            trilinear +
+            joining_correction([&](int i, int j, int k) { return nodes_.at(base.offsetBy(i, j, k)); }, t);
+        const bool one_side = (joined < 0.0) == (trilinear < 0.0);
+        return {joined, one_side && std::abs(trilinear) > std::abs(joined) ? trilinear : joined};
     }
 
     /// Trilinear value, and the trilinear interpolation of the central differences at the corners, per voxel.
@@ -465,7 +472,8 @@ public:
     GridProbe(const FloatTree& tree, const AffineMap& map)
         : Probe(kProjectionError * map.voxel_size, map.voxel_size), map_(map), stencil_(tree) {}
 
-    double value(const Vec3& p) override { return stencil_.value(map_.to_index(p)); }
+    double value(const Vec3& p) override { return stencil_.value(map_.to_index(p)).joined; }
+    double farther_value(const Vec3& p) override { return stencil_.value(map_.to_index(p)).farther; }
 
     Surface::Sample sample(const Vec3& p) override {
         Surface::Sample s = stencil_.sample(map_.to_index(p));

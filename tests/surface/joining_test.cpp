@@ -1,6 +1,7 @@
 // Nodes across the diagonals of lattice faces: the surface joins what volumeToMesh joins.
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include <array>
@@ -64,6 +65,28 @@ openvdb::FloatGrid::Ptr refined(const LevelSet& level_set, int nodes, int times)
         grid->tree().setValueOn(*c, static_cast<float>(probe->value(Vec3((*c)[0], (*c)[1], (*c)[2]) /
                                                                     static_cast<double>(times))));
     return grid;
+}
+
+TEST(Joining, TheFartherValueIsTheTrilinearOneWhereThatIsFartherOnTheSameSide) {
+    const LevelSet level_set(random_grid(7, 8, 0.4));
+    const auto probe = level_set.probe();
+    using Sampler = openvdb::tools::GridSampler<openvdb::FloatGrid, openvdb::tools::BoxSampler>;
+    const Sampler trilinear(*level_set.grid());
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> within(-1.0, 10.0);
+    int farther = 0, nearer = 0, parted = 0;
+    for (int trial = 0; trial < 100000; ++trial) {
+        const Vec3 p(within(random), within(random), within(random));
+        const double value = probe->value(p), plain = trilinear.wsSample(openvdb::Vec3d(p.x(), p.y(), p.z()));
+        const bool same_side = (value < 0.0) == (plain < 0.0);
+        const double expected = same_side && std::abs(plain) > std::abs(value) ? plain : value;
+        EXPECT_NEAR(probe->farther_value(p), expected, 1e-6);
+        if (std::abs(value - plain) < 1e-6) continue;
+        (!same_side ? parted : expected == plain ? farther : nearer) += 1;
+    }
+    EXPECT_GT(farther, 100);
+    EXPECT_GT(nearer, 100);
+    EXPECT_GT(parted, 100);
 }
 
 TEST(Joining, TheSurfaceHasTheComponentsOfVolumeToMesh) {
