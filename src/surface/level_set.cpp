@@ -28,6 +28,7 @@ using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using Leaf = FloatTree::LeafNodeType;
 
+constexpr double kFewNodes = 0.25;         // of the active ones
 constexpr double kProjectionError = 1e-4;  // voxels; float values carry no more
 constexpr double kFarVoxels = 10.0;        // values are clamped to this many voxels
 constexpr int kCapLayers = 4;              // voxels added beyond a block whose border cuts the surface
@@ -573,7 +574,26 @@ std::optional<Surface::Numbers> LevelSet::lattice_numbers() const {
     return Numbers{components, euler};  // two edges for every quad
 }
 TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reach) const {
-    return lattice_mesh_of(quadrangles_near(places, reach, volume_to_polygons(*impl_->grid, 0.0)), *this);
+    // Around few places their nodes alone are looked at, and two more to each side.
+    const Vec3 most = lattice().inverse().linear().cwiseAbs() * Vec3::Constant(reach) + Vec3::Constant(2.0);
+    FloatGrid::ConstPtr grid = impl_->grid;
+    if (static_cast<double>(places.size()) * (2.0 * most + Vec3::Ones()).prod() <
+        kFewNodes * static_cast<double>(impl_->active_voxels)) {
+        const FloatGrid::Ptr near = grid->copyWithNewTree();
+        auto to = near->getAccessor();
+        const auto from = grid->getConstAccessor();
+        for (const Vec3& place : places) {
+            const Vec3 middle = lattice().inverse() * place;
+            const auto corner = [&](double side) {
+                const Vec3 p = (middle + side * most).array().round();
+                return Coord(static_cast<int>(p.x()), static_cast<int>(p.y()), static_cast<int>(p.z()));
+            };
+            for (auto node = openvdb::CoordBBox(corner(-1.0), corner(1.0)).begin(); node; ++node)
+                to.setValue(*node, from.getValue(*node));
+        }
+        grid = near;
+    }
+    return lattice_mesh_of(quadrangles_near(places, reach, volume_to_polygons(*grid, 0.0)), *this);
 }
 
 std::vector<Surface::Diagonal> LevelSet::diagonals() const {

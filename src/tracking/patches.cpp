@@ -18,6 +18,8 @@ constexpr double kSmall = 3.5;  // reach of the pieces of the mesh that are look
 constexpr double kThin = 2.0;   // sheets no farther apart
 constexpr double kApart = 1.5;  // places that near are one
 constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
+constexpr double kHarmlessReach = 2.0;
+constexpr std::size_t kFewPlaces = 4;
 constexpr double kLatticeReach = 24.0;
 constexpr std::size_t kMostWork = 20000000;  // triangles looked at, each as often as it is
 
@@ -63,13 +65,26 @@ bool crosses(const Patch& patch, const FrameMesh& mesh) {
     return any_cross(points, patch.triangles, rest);
 }
 
+/// Whether there are only a few, where patches would change nothing: the numbers of the whole lattice are
+/// dearer.
+bool are_harmless(const std::vector<Vec3>& places, const FrameMesh& mesh, const Surface& surface) {
+    if (places.size() > kFewPlaces) return false;
+    const double resolution = surface.resolution();
+    const TriangleMesh lattice = surface.lattice_mesh(places, 4.0 * kHarmlessReach * resolution);
+    return std::all_of(places.begin(), places.end(), [&](const Vec3& place) {
+        const auto patch = patch_around(place, kHarmlessReach * resolution, mesh.vertices,
+                                        mesh.carved.triangles, lattice, resolution);
+        return patch && patch->euler == 0;
+    });
+}
+
 }  // namespace
 
 std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface) {
     const double resolution = surface.resolution();
     const std::vector<Vec3> places =
         suspicious_places(trials.mesh(), trials.inspection().topology, thickness, resolution);
-    if (places.empty()) return 0;
+    if (places.empty() || are_harmless(places, trials.mesh(), surface)) return 0;
     const auto wanted = surface.lattice_numbers();
     if (!wanted) return 0;
     // Components and handles that are too many or too few.
