@@ -28,6 +28,8 @@ using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using Leaf = FloatTree::LeafNodeType;
 
+// Of the trilinear value: with less the joined surface is near, which must do.
+constexpr double kNoLess = 0.5;
 constexpr double kFewNodes = 0.25;         // of the active ones
 constexpr double kProjectionError = 1e-4;  // voxels; float values carry no more
 constexpr double kFarVoxels = 10.0;        // values are clamped to this many voxels
@@ -142,7 +144,8 @@ class Stencil {
 public:
     explicit Stencil(const FloatTree& tree) : nodes_(tree) {}
 
-    /// Of an ambiguous cell also without what joins its nodes, where that is farther on the same side.
+    /// Of an ambiguous cell also without what joins its nodes, where that is farther on the same side, by up
+    /// to twice.
     struct Value {
         double joined, farther;
     };
@@ -160,8 +163,7 @@ public:
         const double joined =
             trilinear +
             joining_correction([&](int i, int j, int k) { return nodes_.at(base.offsetBy(i, j, k)); }, t);
-        const bool one_side = (joined < 0.0) == (trilinear < 0.0);
-        return {joined, one_side && std::abs(trilinear) > std::abs(joined) ? trilinear : joined};
+        return {joined, is_farther(trilinear, joined) ? trilinear : joined};
     }
 
     /// Trilinear value, and the trilinear interpolation of the central differences at the corners, per voxel.
@@ -193,6 +195,10 @@ public:
     }
 
 private:
+    static bool is_farther(double trilinear, double joined) {
+        return (joined < 0.0) == (trilinear < 0.0) && std::abs(trilinear) > std::abs(joined) &&
+               std::abs(joined) > kNoLess * std::abs(trilinear);
+    }
     static bool has_ambiguous_face(const float (&corners)[2][2][2]) {
         unsigned inside = 0;
         for (unsigned c = 0; c < 8; ++c)

@@ -88,14 +88,13 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const auto wanted = surface.lattice_numbers();
     if (!wanted) return 0;
     // Components and handles that are too many or too few.
-    const auto astray = [&](const FrameMesh& mesh) {
-        const MeshTopology topology = topology_of(mesh);
+    const auto astray = [&](const MeshTopology& topology) {
         const long components =
                        static_cast<long>(topology.components) - static_cast<long>(wanted->components),
                    handles = components - (topology.euler - wanted->euler) / 2;
         return std::abs(components) + std::abs(handles);
     };
-    long now = astray(trials.mesh());
+    long now = astray(topology_of(trials.mesh()));
     if (now == 0) return 0;
     const TriangleMesh lattice = surface.lattice_mesh(places, kLatticeReach * resolution);
     std::size_t count = 0, work = 0;
@@ -106,8 +105,9 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         work += trials.mesh().carved.triangles.size();
         if (!patch || patch->euler == 0) return;
         FrameMesh other = patched(trials.mesh(), *patch);
-        const long then = astray(other);
-        if (then >= now) return;
+        const MeshTopology topology = topology_of(other);
+        const long then = astray(topology);
+        if (then >= now || !topology.closed() || !topology.oriented() || !topology.manifold()) return;
         if (crosses(*patch, trials.mesh()) || !trials.try_mesh(std::move(other))) {
             for (const Vec3& v : trials.mesh().vertices)
                 if ((v - place).norm() < reach) around.push_back(v);

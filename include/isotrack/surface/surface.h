@@ -32,8 +32,8 @@ public:
         /// Right in sign everywhere; right in size only below `Surface::reach()`.
         virtual double value(const Vec3& p) = 0;
 
-        /// The value, or another that is farther off on the same side where the surface may be read in more
-        /// than one way: what meshes are held to.
+        /// The value, or another that is farther off on the same side, by up to twice, where the surface may
+        /// be read in more than one way: what meshes are held to.
         virtual double farther_value(const Vec3& p) { return value(p); }
 
         /// Value and gradient together, for less than the price of both.
