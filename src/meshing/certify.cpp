@@ -21,6 +21,7 @@ namespace {
 constexpr double kFacing = -0.2;
 
 constexpr int kFewestSteps = 3, kMostSteps = 6;
+constexpr double kSteep = 0.3;  // of the steepest a distance can be
 constexpr double kAlmost =
     1.4;  // times what is refined: a few points may have missed the larger of two maxima
 
@@ -46,29 +47,49 @@ void climb(Surface::Probe& probe, const Vec3& a, const Vec3& ab, const Vec3& ac,
     }
 }
 
-}  // namespace
-
-TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
-                             double refine_above) {
+/// The error at the points of a lattice, and how fast values change between those next to each other.
+struct Survey {
     TriangleError error;
+    double steepest = 0.0;
+};
+
+Survey survey(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
+              double refine_above) {
+    Survey result;
+    TriangleError& error = result.error;
     int count = 0;
     Sample outside, inside;  // the farthest on either side
-    for (int i = 0; i <= steps; ++i)
+    const double along = steps / (c - a).norm(), across = steps / (b - a).norm();
+    thread_local std::vector<double> row, row_before;  // there are many triangles
+    row.resize(steps + 1);
+    row_before.resize(steps + 1);
+    for (int i = 0; i <= steps; ++i) {
         for (int j = 0; i + j <= steps; ++j) {
             const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
-            const double value = probe.farther_value(a + u * (b - a) + v * (c - a));
+            const double value = row[j] = probe.farther_value(a + u * (b - a) + v * (c - a));
             error.mean_square += value * value;
             ++count;
             if (value > outside.distance) outside = {u, v, value};
             if (-value > inside.distance) inside = {u, v, -value};
+            if (i > 0) result.steepest = std::max(result.steepest, std::abs(value - row_before[j]) * across);
+            if (j > 0) result.steepest = std::max(result.steepest, std::abs(value - row[j - 1]) * along);
         }
+        row.swap(row_before);
+    }
     if (outside.distance > refine_above) climb(probe, a, b - a, c - a, 0.5 / steps, 1.0, outside);
     if (inside.distance > refine_above) climb(probe, a, b - a, c - a, 0.5 / steps, -1.0, inside);
     const Sample& farthest = outside.distance > inside.distance ? outside : inside;
     error.largest = farthest.distance;
     error.where = a + farthest.u * (b - a) + farthest.v * (c - a);
     error.mean_square /= count;
-    return error;
+    return result;
+}
+
+}  // namespace
+
+TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
+                             double refine_above) {
+    return survey(a, b, c, probe, steps, refine_above).error;
 }
 
 int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution) {
@@ -80,8 +101,8 @@ int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution) 
 TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
                               double resolution, double refine_above) {
     const int steps = error_steps(a, b, c, resolution);
-    const TriangleError error = triangle_error(a, b, c, probe, steps, refine_above);
-    if (steps == kMostSteps || !(error.largest > kAlmost * refine_above)) return error;
+    const auto [error, steepest] = survey(a, b, c, probe, steps, refine_above);
+    if (steps == kMostSteps || !(error.largest > kAlmost * refine_above || steepest > kSteep)) return error;
     const TriangleError again = triangle_error(a, b, c, probe, kMostSteps, refine_above);
     return again.largest > error.largest ? again : error;
 }

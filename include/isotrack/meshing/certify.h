@@ -27,8 +27,9 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
 /// The intervals per edge that show the error of triangle abc: one per resolution of the surface on its
 /// longest edge, but 3 at least and 6 at most.
 int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution);
-/// The error of triangle abc with `error_steps` intervals per edge; where that is above 1.4 `refine_above`,
-/// with 6 as well, and the larger of the two. `refine_above`: as for `triangle_error`.
+/// The error of triangle abc with `error_steps` intervals per edge; where that is above 1.4 `refine_above`
+/// or changes steeply, by 0.3 of the way between points or more, with 6 as well, and the larger of the two.
+/// `refine_above`: as for `triangle_error`.
 TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
                               double resolution, double refine_above);
 /// Instead of a number: that of `certified_error`.
