@@ -35,6 +35,21 @@ std::optional<Vec3> crossing_amid(const Vec3 (&cells)[4], const Eigen::Affine3d&
     return from + a / (a - b) * (to - from);
 }
 
+/// Flags for the points that are not alone in their cell.
+std::vector<char> share_cells(const std::vector<Vec3>& points, const Eigen::Affine3d& to_lattice) {
+    std::vector<std::pair<std::array<int, 3>, int>> by_cell;
+    for (const Vec3& p : points) {
+        const Eigen::Array3i cell = (to_lattice * p).array().floor().cast<int>();
+        by_cell.push_back({{cell[0], cell[1], cell[2]}, static_cast<int>(by_cell.size())});
+    }
+    std::sort(by_cell.begin(), by_cell.end());
+    std::vector<char> result(points.size(), 0);
+    for (std::size_t i = 1; i < by_cell.size(); ++i)
+        if (by_cell[i].first == by_cell[i - 1].first)
+            result[by_cell[i].second] = result[by_cell[i - 1].second] = 1;
+    return result;
+}
+
 /// An edge of a quadrangle, between two cells.
 struct CellEdge {
     int low, high;  // corners
@@ -87,6 +102,7 @@ TriangleMesh lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surf
     const auto cell_of = [&](const Vec3& p) -> Vec3 { return (to_lattice * p).array().floor(); };
     const auto& in_cell = quadrangles.points;
     const std::size_t cells = in_cell.size(), quads = quadrangles.quads.size();
+    const std::vector<char> shares_cell = share_cells(in_cell, to_lattice);
     ThreadProbes probes(surface);
     TriangleMesh mesh;
     mesh.points = in_cell;
@@ -94,7 +110,8 @@ TriangleMesh lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surf
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells, 256), [&](const auto& range) {
         Surface::Probe& probe = probes.local();
         for (std::size_t v = range.begin(); v < range.end(); ++v)
-            if (const auto p = probe.project(in_cell[v]); p && cell_of(*p) == cell_of(in_cell[v]))
+            if (const auto p = probe.project(in_cell[v]);
+                !shares_cell[v] && p && cell_of(*p) == cell_of(in_cell[v]))
                 mesh.points[v] = *p;
     });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, quads, 256), [&](const auto& range) {

@@ -8,10 +8,10 @@ namespace isotrack {
 
 /// From the quadrangles of volumeToMesh without adaptivity, one around every crossed edge of
 /// `surface.lattice()`: each becomes eight triangles around that crossing. Its corners, one or more in every
-/// cell that the surface passes through, go to the surface where the way there stays within the cell; its
-/// edges pass through the common face of two cells between the crossings there. So no triangle leaves its
-/// cell, and only parts of the surface within one cell may cross [Ju and Udeshi 2006, "Intersection-free
-/// contouring on an octree grid"].
+/// cell that the surface passes through, go to the surface where they are alone in their cell and the way
+/// there stays within it; its edges pass through the common face of two cells between the crossings there. So
+/// no triangle leaves its cell, and only parts of the surface within one cell may cross [Ju and Udeshi 2006,
+/// "Intersection-free contouring on an octree grid"]: beside a node whose value is next to nothing they do.
 TriangleMesh lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surface);
 
 /// The quadrangles with a corner in a cube around a place, `reach` to each side.
