@@ -13,7 +13,7 @@
 #include <cstring>
 #include <limits>
 
-#include "disjoint_sets.h"
+#include "component_boxes.h"
 #include "find_in_blocks.h"
 #include "isotrack/error.h"
 #include "surface/ambiguous_faces.h"
@@ -571,13 +571,8 @@ std::optional<Surface::Numbers> LevelSet::lattice_numbers() const {
     std::vector<openvdb::Vec3s> points;
     std::vector<openvdb::Vec4I> quads;
     openvdb::tools::volumeToMesh(*impl_->grid, points, quads);
-    DisjointSets vertices(points.size());
-    std::size_t components = points.size();
-    for (const openvdb::Vec4I& q : quads)
-        for (int k = 1; k < 4; ++k)
-            components -= vertices.join(static_cast<int>(q[0]), static_cast<int>(q[k]));
     const long euler = static_cast<long>(points.size()) - static_cast<long>(quads.size());
-    return Numbers{components, euler};  // two edges for every quad
+    return Numbers{component_boxes<4>(points, quads), euler};  // two edges for every quad
 }
 TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reach) const {
     // Around few places their nodes alone are looked at, and two more to each side.

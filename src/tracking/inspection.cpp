@@ -192,7 +192,7 @@ Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     return result;
 }
 
-void Inspector::leave_out_unreachable(std::vector<Surface::Crossing>& points) const {
+void Inspector::set_unreachable_aside(std::vector<Surface::Crossing>& points) {
     constexpr double kNear = 0.1, kReachable = 0.95;  // tolerances off the surface
     ThreadProbes probes(surface_);
     std::vector<char> keep(points.size());
@@ -205,23 +205,33 @@ void Inspector::leave_out_unreachable(std::vector<Surface::Crossing>& points) co
             keep[i] = surface_near(probe, p, kReachable * limits_.tolerance).has_value();
         }
     });
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if (!keep[i]) unreachable_.push_back(points[i]);
     compact(points, keep);
+}
+
+void Inspector::measure_between(const std::vector<Surface::Crossing>& points, const FrameMesh& mesh,
+                                Inspection& inspection) {
+    if (points.empty()) return;
+    between_.emplace_back(points, surface_.resolution());
+    distances_.emplace_back(between_.back(), cutoff()).measure(mesh.vertices, mesh.carved.triangles, {});
+    missed_.emplace_back();
+    take_missed(missed_.size() - 1, inspection);
 }
 
 void Inspector::look_between(const FrameMesh& mesh, Inspection& inspection) {
     // Where some crossings stand for others the cells do not have all of theirs.
     if (crossings_.spacing() >= 2.0 * surface_.resolution()) return;
-    const auto& triangles = mesh.carved.triangles;
     prepare_topology();
     if (!between_crossings_)
         between_crossings_.emplace(crossings_, surface_.lattice(), sides_->diagonals(), limits_.tolerance);
-    auto points = between_crossings_->points(mesh.vertices, triangles, distances_.front());
-    leave_out_unreachable(points);
-    if (points.empty()) return;
-    between_.emplace_back(points, surface_.resolution());
-    distances_.emplace_back(between_.back(), cutoff()).measure(mesh.vertices, triangles, {});
-    missed_.emplace_back();
-    take_missed(missed_.size() - 1, inspection);
+    auto points = between_crossings_->points(mesh.vertices, mesh.carved.triangles, distances_.front());
+    set_unreachable_aside(points);
+    measure_between(points, mesh, inspection);
+}
+
+void Inspector::look_off_surface(const FrameMesh& mesh, Inspection& inspection) {
+    measure_between(std::exchange(unreachable_, {}), mesh, inspection);
 }
 
 std::vector<Surface::Crossing> Inspector::newly_missed(const Inspection& now,

@@ -58,6 +58,9 @@ public:
     /// Of the mesh just inspected both ways: finds points between crossings that it may miss, and measures
     /// them.
     void look_between(const FrameMesh& mesh, Inspection& inspection);
+    /// Of the mesh just inspected both ways: measures from now on also such points between crossings found so
+    /// far as no vertex on the surface reaches.
+    void look_off_surface(const FrameMesh& mesh, Inspection& inspection);
     /// What `now` misses and another mesh, of these vertices and triangles, does not. That nobody looked
     /// there when it was inspected is no matter.
     std::vector<Surface::Crossing> newly_missed(const Inspection& now, const std::vector<Vec3>& vertices,
@@ -75,8 +78,10 @@ private:
     std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
     void take_missed(std::size_t d, Inspection& result);  // by distances_[d]
     /// Means of crossings may be so far off the surface that a mesh with vertices on it is beyond the
-    /// tolerance of them.
-    void leave_out_unreachable(std::vector<Surface::Crossing>& points) const;
+    /// tolerance of them: those are set aside.
+    void set_unreachable_aside(std::vector<Surface::Crossing>& points);
+    void measure_between(const std::vector<Surface::Crossing>& points, const FrameMesh& mesh,
+                         Inspection& inspection);
     void forget_distances();
     double cutoff() const;
     /// Adds the lattice crossings near some places to the doubtful ones; `spacing` in resolutions.
@@ -94,7 +99,8 @@ private:
     std::shared_ptr<const std::vector<TriangleError>> errors_;  // of each
     FacetChanges changes_;                                      // since the inspection before
     std::optional<BetweenCrossings> between_crossings_;
-    std::deque<CrossingGrid> between_;      // points between crossings, as they were found
+    std::deque<CrossingGrid> between_;  // points between crossings, as they were found
+    std::vector<Surface::Crossing> unreachable_;
     std::deque<MeshDistances> distances_;   // to the facets: of the crossings, then of each of between_
     bool measured_ = false;                 // and kept up to date from then on
     std::vector<std::vector<int>> missed_;  // of each of distances_, ascending

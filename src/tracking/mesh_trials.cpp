@@ -1,6 +1,7 @@
 #include "tracking/mesh_trials.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "tracking/failing.h"
@@ -14,17 +15,39 @@ double largest_error(const Inspection& inspection) {
     return result;
 }
 
+std::vector<Vec3> failing_in(const Inspection& inspection, double tolerance) {
+    std::vector<Vec3> result;
+    for (const TriangleError& error : *inspection.errors)
+        if (error.largest > kCertified * tolerance) result.push_back(error.where);
+    for (const Surface::Crossing& missed : inspection.missed) result.push_back(missed.point);
+    return result;
+}
+
 }  // namespace
 
 MeshTopology topology_of(const FrameMesh& mesh) {
     return mesh_topology({mesh.vertices, mesh.carved.triangles, {}, {}});
 }
 
+std::vector<Vec3> MeshTrials::failing_places() const {
+    return failing_in(inspection_, limits_.tolerance);
+}
+
 bool MeshTrials::try_mesh(FrameMesh other) {
+    return take(std::move(other), std::numeric_limits<std::size_t>::max());
+}
+
+bool MeshTrials::try_to_mend(FrameMesh other) {
+    const std::size_t failing = failing_places().size();
+    return failing > 0 && take(std::move(other), failing - 1);
+}
+
+bool MeshTrials::take(FrameMesh other, std::size_t most_failing) {
     Inspection after = inspector_.inspect_both_ways(other);
     inspector_.look_between(other, after);
     const bool good =
         largest_error(after) <= std::max(kCertified * limits_.tolerance, largest_error(inspection_)) &&
+        failing_in(after, limits_.tolerance).size() <= most_failing &&
         inspector_.newly_missed(after, mesh_.vertices, mesh_.carved.triangles).empty();
     if (good) {
         inspector_.inspect_topology(other, after);

@@ -22,8 +22,14 @@ public:
     /// Takes a mesh if it misses nothing that the one there does not, and if its largest error is within the
     /// tolerance or no larger. Returns whether it did.
     bool try_mesh(FrameMesh other);
+    /// Takes a mesh if moreover it fails at fewer places.
+    bool try_to_mend(FrameMesh other);
+    /// Where a triangle is too far off, and what is missed.
+    std::vector<Vec3> failing_places() const;
 
 private:
+    bool take(FrameMesh other, std::size_t most_failing);
+
     FrameMesh& mesh_;
     Inspection& inspection_;
     Inspector& inspector_;

@@ -1,4 +1,4 @@
-// Parts of a frame's mesh that have another topology than the lattice of its surface.
+// Parts of a frame's mesh exchanged for those of the lattice of its surface.
 #pragma once
 
 #include <vector>
@@ -13,5 +13,9 @@ namespace isotrack {
 /// `thickness`: per particle, the distance to the next sheet. New vertices stand on no particle, new
 /// triangles are no facets. Returns how many parts were exchanged.
 std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface);
+
+/// The same around places that particles did not mend, where too far a triangle or a missed point is left,
+/// while these become fewer and the topology stays.
+std::size_t patch_failing(MeshTrials& trials, const Surface& surface);
 
 }  // namespace isotrack

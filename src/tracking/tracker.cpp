@@ -483,6 +483,8 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
             inspector->inspect_topology(mesh, inspection);
         MeshTrials of_mesh(mesh, inspection, *inspector, l);
         patch_topology(of_mesh, last_mesh.evidence.thickness, surface);
+        inspector->look_off_surface(mesh, inspection);
+        patch_failing(of_mesh, surface);
     }
     frame.relocated += dt->profile().relocated - relocated;
     inherit_velocities(particle_triangles(mesh.carved), first_new);

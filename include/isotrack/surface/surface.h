@@ -101,13 +101,13 @@ public:
     virtual std::vector<Diagonal> diagonals() const { return {}; }
     /// The surface that parts the lattice nodes, joined as `diagonals` says: closed, with vertices at each
     /// crossing, in every cell that it passes through and on the faces between, all near the surface if not
-    /// on it. Parts of it within one cell may cross. At least what is in cubes around some places, `reach`
-    /// to each side, and open beyond. This default has none.
+    /// on it. Parts of it within one cell may cross where it passes next to a node. At least what is in cubes
+    /// around some places, `reach` to each side, and open beyond. This default has none.
     virtual TriangleMesh lattice_mesh(const std::vector<Vec3>& /*places*/, double /*reach*/) const {
         return {};
     }
     struct Numbers {
-        std::size_t components;
+        std::vector<Box> components;  ///< That hold the vertices of one in a cell each.
         long euler;
     };
     /// Of that mesh, for a part of its price.
