@@ -16,7 +16,7 @@ namespace {
 
 /// Where the lattice edge that the four cells around are common to crosses the surface. `cells`: their
 /// lowest corners. nullopt where they are not around an edge that does.
-std::optional<Vec3> crossing_amid(const Vec3 (&cells)[4], const Eigen::Affine3d& lattice,
+std::optional<Vec3> crossing_amid(const Vec3 (&cells)[4], const Eigen::Affine3d& lattice, double resolution,
                                   Surface::Probe& probe) {
     const Vec3 low = cells[0].cwiseMin(cells[1]).cwiseMin(cells[2]).cwiseMin(cells[3]),
                high = cells[0].cwiseMax(cells[1]).cwiseMax(cells[2]).cwiseMax(cells[3]),
@@ -30,7 +30,7 @@ std::optional<Vec3> crossing_amid(const Vec3 (&cells)[4], const Eigen::Affine3d&
     }
     if (axis < 0) return std::nullopt;
     const Vec3 from = lattice * high, to = lattice * Vec3(high + Vec3::Unit(axis));
-    const double a = probe.value(from), b = probe.value(to);
+    const double a = off_node(probe.value(from), resolution), b = off_node(probe.value(to), resolution);
     if ((a < 0.0) == (b < 0.0)) return std::nullopt;
     return from + a / (a - b) * (to - from);
 }
@@ -120,7 +120,7 @@ TriangleMesh lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surf
             mesh.points[cells + q] =
                 crossing_amid(
                     {cell_of(in_cell[i]), cell_of(in_cell[j]), cell_of(in_cell[k]), cell_of(in_cell[l])},
-                    lattice, probes.local())
+                    lattice, surface.resolution(), probes.local())
                     .value_or(0.25 * (in_cell[i] + in_cell[j] + in_cell[k] + in_cell[l]));
         }
     });

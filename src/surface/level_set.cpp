@@ -1,6 +1,7 @@
 #include "isotrack/surface/level_set.h"
 
 #include <openvdb/tools/SignedFloodFill.h>
+#include <openvdb/tools/ValueTransformer.h>
 #include <openvdb/tools/VolumeToMesh.h>
 #include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
@@ -577,12 +578,12 @@ std::optional<Surface::Numbers> LevelSet::lattice_numbers() const {
 TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reach) const {
     // Around few places their nodes alone are looked at, and two more to each side.
     const Vec3 most = lattice().inverse().linear().cwiseAbs() * Vec3::Constant(reach) + Vec3::Constant(2.0);
-    FloatGrid::ConstPtr grid = impl_->grid;
+    FloatGrid::Ptr grid;
     if (static_cast<double>(places.size()) * (2.0 * most + Vec3::Ones()).prod() <
         kFewNodes * static_cast<double>(impl_->active_voxels)) {
-        const FloatGrid::Ptr near = grid->copyWithNewTree();
-        auto to = near->getAccessor();
-        const auto from = grid->getConstAccessor();
+        grid = impl_->grid->copyWithNewTree();
+        auto to = grid->getAccessor();
+        const auto from = impl_->grid->getConstAccessor();
         for (const Vec3& place : places) {
             const Vec3 middle = lattice().inverse() * place;
             const auto corner = [&](double side) {
@@ -592,8 +593,12 @@ TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reac
             for (auto node = openvdb::CoordBBox(corner(-1.0), corner(1.0)).begin(); node; ++node)
                 to.setValue(*node, from.getValue(*node));
         }
-        grid = near;
+    } else {
+        grid = impl_->grid->deepCopy();
     }
+    openvdb::tools::foreach (grid->beginValueOn(), [this](const FloatGrid::ValueOnIter& value) {
+        value.setValue(off_node(*value, static_cast<float>(impl_->map.voxel_size)));
+    });
     return lattice_mesh_of(quadrangles_near(places, reach, volume_to_polygons(*grid, 0.0)), *this);
 }
 

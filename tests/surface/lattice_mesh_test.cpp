@@ -71,10 +71,9 @@ std::set<Place> places_of(const std::vector<Vec3>& points) {
     return result;
 }
 
-/// Every crossing is a vertex, and every triangle stays within a cell.
-void expect_within_cells(const LevelSet& level_set) {
-    const TriangleMesh mesh = level_set.lattice_mesh(kAll, kFarReach);
-    const std::set<Place> vertices = places_of(mesh.points);
+/// Every crossing is a vertex.
+void expect_crossings(const LevelSet& level_set) {
+    const std::set<Place> vertices = places_of(level_set.lattice_mesh(kAll, kFarReach).points);
     for (const auto& crossing : level_set.crossings()) {
         const Vec3 p = to_float_precision(crossing.point);
         const double h = 1e-5;  // both are rounded
@@ -82,6 +81,11 @@ void expect_within_cells(const LevelSet& level_set) {
         EXPECT_TRUE(std::any_of(near, vertices.upper_bound({p.x() + h, 1e9, 1e9}),
                                 [&](const Place& v) { return (Vec3(v[0], v[1], v[2]) - p).norm() < h; }));
     }
+}
+
+/// Every triangle stays within a cell.
+void expect_within_cells(const LevelSet& level_set) {
+    const TriangleMesh mesh = level_set.lattice_mesh(kAll, kFarReach);
     const Eigen::Affine3d to_lattice = level_set.lattice().inverse();
     for (const Triangle& t : mesh.triangles) {
         Box box;
@@ -115,8 +119,32 @@ TEST(LatticeMesh, HasTheTopologyOfVolumeToMeshWhateverTheNodesAre) {
         for (unsigned seed = 0; seed < 5; ++seed) {
             const LevelSet level_set = strewn(seed, share);
             expect_as_volume_to_mesh(level_set);
+            expect_crossings(level_set);
             expect_within_cells(level_set);
             EXPECT_TRUE(self_intersections(level_set.lattice_mesh(kAll, kFarReach)).empty());
+        }
+}
+
+/// Triangles have an area, and no two vertices are in one place.
+TEST(LatticeMesh, IsSoundWhereNodesAreOnTheSurface) {
+    for (const Vec3& voxel : {Vec3(1, 1, 1), Vec3(0.01, 0.01, 0.01)})
+        for (unsigned seed = 0; seed < 4; ++seed) {
+            std::mt19937 random(seed);
+            std::uniform_int_distribution<int> any(-2, 3);
+            const LevelSet level_set = cube_of(
+                [&](int, int, int) {
+                    constexpr double kValues[] = {-0.7, -1e-9, -0.0, 0.0, 1e-9, 0.7};
+                    return kValues[any(random) + 2] * voxel.x();
+                },
+                voxel);
+            const TriangleMesh mesh = level_set.lattice_mesh(kAll, kFarReach);
+            const MeshTopology ours = mesh_topology(mesh), theirs = mesh_topology(volume_to_mesh(level_set));
+            EXPECT_TRUE(ours.closed() && ours.oriented());
+            EXPECT_EQ(ours.components, theirs.components);
+            EXPECT_EQ(ours.euler, theirs.euler);
+            EXPECT_EQ(places_of(mesh.points).size(), mesh.points.size());
+            const std::vector<double> angles = smallest_angles(mesh);
+            EXPECT_GT(*std::min_element(angles.begin(), angles.end()), 0.001);
         }
 }
 
@@ -129,10 +157,8 @@ TEST(LatticeMesh, FacesOutwardInMirroredAndStretchedLattices) {
     }
 }
 
-TEST(LatticeMesh, OfSomePlacesIsAPartOfTheWhole) {
-    const LevelSet level_set = strewn(3, 0.4);
-    const std::vector<Vec3> places = {Vec3(-4, 2, 1), Vec3(5, 5, -6)};
-    constexpr double kReach = 3.0;
+/// Few places are looked at alone, more in the whole grid: 729 nodes around each of them here, of 9261.
+void expect_part_of_the_whole(const LevelSet& level_set, const std::vector<Vec3>& places, double reach) {
     const auto triangles_in = [&](const TriangleMesh& mesh) {
         std::multiset<std::array<double, 9>> result;
         for (const Triangle& t : mesh.triangles) {
@@ -141,17 +167,29 @@ TEST(LatticeMesh, OfSomePlacesIsAPartOfTheWhole) {
             for (int k = 0; k < 3; ++k)
                 for (int c = 0; c < 3; ++c) place[3 * k + c] = mesh.points[t[k]][c];
             for (const Vec3& p : places)
-                in = in || (Vec3(place[0], place[1], place[2]) - p).lpNorm<Eigen::Infinity>() < kReach - 1.0;
+                in = in || (Vec3(place[0], place[1], place[2]) - p).lpNorm<Eigen::Infinity>() < 0.6 * reach;
             if (in) result.insert(place);
         }
         return result;
     };
-    const TriangleMesh part = level_set.lattice_mesh(places, kReach),
+    const TriangleMesh part = level_set.lattice_mesh(places, reach),
                        all = level_set.lattice_mesh(kAll, kFarReach);
     EXPECT_EQ(triangles_in(part), triangles_in(all));
     EXPECT_FALSE(triangles_in(part).empty());
     EXPECT_LT(part.triangles.size(), all.triangles.size() / 4);
-    EXPECT_TRUE(level_set.lattice_mesh({}, kReach).empty());
+    EXPECT_TRUE(level_set.lattice_mesh({}, reach).empty());
+}
+
+TEST(LatticeMesh, OfSomePlacesIsAPartOfTheWhole) {
+    const std::vector<Vec3> places = {Vec3(-4, 2, 1), Vec3(5, 5, -6)};
+    expect_part_of_the_whole(strewn(3, 0.4), places, 3.0);
+    expect_part_of_the_whole(strewn(3, 0.4), places, 2.0);
+    // Inside and out, where the nodes far away are not as those around.
+    const auto ball = [](int x, int y, int z) { return Vec3(x, y, z).norm() - 8.3; };
+    for (const Vec3& voxel : {Vec3(1, 1, 1), Vec3(-1, 1.5, 0.8)}) {
+        const Vec3 top = Vec3(4.1, 4.8, 5.3).cwiseProduct(voxel);
+        expect_part_of_the_whole(cube_of(ball, voxel), {top}, 2.0);
+    }
 }
 
 }  // namespace

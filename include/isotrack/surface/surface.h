@@ -100,9 +100,9 @@ public:
     /// Those of a surface that says how nodes are joined; this default has none.
     virtual std::vector<Diagonal> diagonals() const { return {}; }
     /// The surface that parts the lattice nodes, joined as `diagonals` says: closed, with vertices at each
-    /// crossing, in every cell that it passes through and on the faces between, all near the surface if not
-    /// on it. Parts of it within one cell may cross where it passes next to a node. At least what is in cubes
-    /// around some places, `reach` to each side, and open beyond. This default has none.
+    /// crossing (a little off the nodes), in every cell that it passes through and on the faces between, all
+    /// near the surface if not on it. At least what is in cubes around some places, `reach` to each side, and
+    /// open beyond. This default has none.
     virtual TriangleMesh lattice_mesh(const std::vector<Vec3>& /*places*/, double /*reach*/) const {
         return {};
     }
