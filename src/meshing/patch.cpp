@@ -11,7 +11,6 @@
 
 #include "disjoint_sets.h"
 #include "meshing/triangle_distance.h"
-#include "sampling/compact.h"
 
 namespace isotrack {
 namespace {
@@ -29,11 +28,6 @@ double squared_distance_to_edge(const Vec3& p, const Vec3& a, const Vec3& b) {
     const double length2 = ab.squaredNorm();
     const double t = length2 > 0.0 ? std::clamp(ap.dot(ab) / length2, 0.0, 1.0) : 0.0;
     return (ap - t * ab).squaredNorm();
-}
-
-Box box_of(const Triangle& t, const std::vector<Vec3>& points) {
-    Box box(points[t[0]]);
-    return box.extend(points[t[1]]).extend(points[t[2]]);
 }
 
 /// The edges of triangles that have one of them alone, each as it runs there, ascending.
@@ -61,8 +55,12 @@ bool has_any(const Triangle& t, const std::vector<int>& ascending) {
                        [&](int v) { return std::binary_search(ascending.begin(), ascending.end(), v); });
 }
 
-/// The Euler number of triangles with all their edges and corners.
-long euler_of(const std::vector<Triangle>& triangles) {
+struct Numbers {
+    long components, euler;
+};
+
+/// Of triangles with all their edges and corners.
+Numbers numbers_of(const std::vector<Triangle>& triangles) {
     std::vector<int> corners;
     std::vector<std::pair<int, int>> edges;
     for (const Triangle& t : triangles)
@@ -70,11 +68,20 @@ long euler_of(const std::vector<Triangle>& triangles) {
             corners.push_back(t[k]);
             edges.emplace_back(std::minmax(t[k], t[(k + 1) % 3]));
         }
-    const auto count = [](auto& values) {
+    const auto unify = [](auto& values) {
         std::sort(values.begin(), values.end());
-        return std::unique(values.begin(), values.end()) - values.begin();
+        values.erase(std::unique(values.begin(), values.end()), values.end());
     };
-    return static_cast<long>(count(corners) - count(edges)) + static_cast<long>(triangles.size());
+    unify(corners);
+    unify(edges);
+    const auto number = [&](int v) {
+        return static_cast<int>(std::lower_bound(corners.begin(), corners.end(), v) - corners.begin());
+    };
+    DisjointSets sets(corners.size());
+    auto components = static_cast<long>(corners.size());
+    for (const auto& [from, to] : edges) components -= sets.join(number(from), number(to));
+    return {components, static_cast<long>(corners.size()) - static_cast<long>(edges.size()) +
+                            static_cast<long>(triangles.size())};
 }
 
 /// Of a border that is pinched nowhere.
@@ -133,38 +140,22 @@ std::vector<Triangle> strip_between(const Loop& outer, const Loop& inner,
     return result;
 }
 
-std::vector<Triangle> flagged(std::vector<Triangle> triangles, const std::vector<char>& flags) {
-    compact(triangles, flags);
-    return triangles;
-}
-
-/// Flags for the triangles within reach of a place, and for those around where their border would be pinched.
-std::vector<char> going_around(const Vec3& place, double reach, const std::vector<Vec3>& points,
-                               const std::vector<Triangle>& triangles) {
-    std::vector<char> result(triangles.size(), 0);
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-        const auto& [i, j, k] = triangles[t];
-        result[t] = box_of(triangles[t], points).squaredExteriorDistance(place) <= reach * reach &&
-                    squared_distance(place, points[i], points[j], points[k]) <= reach * reach;
-    }
-    for (;;) {
-        const std::vector<int> bad = pinched(border_of(flagged(triangles, result)));
-        if (bad.empty()) return result;
-        for (std::size_t t = 0; t < triangles.size(); ++t)
-            result[t] = result[t] || has_any(triangles[t], bad);
-    }
+std::vector<Triangle> some_of(const std::vector<Triangle>& triangles, const std::vector<int>& some) {
+    std::vector<Triangle> result;
+    for (const int t : some) result.push_back(triangles[t]);
+    return result;
 }
 
 /// The triangles of a mesh within a box, with vertices of their own.
-TriangleMesh part_within(const Box& bounds, const TriangleMesh& mesh) {
+TriangleMesh part_within(const Box& bounds, const TriangleBins& mesh) {
     TriangleMesh result;
     std::map<int, int> number;
-    for (const Triangle& t : mesh.triangles) {
-        if (!bounds.contains(box_of(t, mesh.points))) continue;
-        result.triangles.push_back(t);
+    for (const int t : mesh.meeting(bounds)) {
+        if (!bounds.contains(mesh.box_of(t))) continue;
+        result.triangles.push_back(mesh.triangles()[t]);
         for (int& v : result.triangles.back()) {
             const auto [entry, is_new] = number.try_emplace(v, static_cast<int>(number.size()));
-            if (is_new) result.points.push_back(mesh.points[v]);
+            if (is_new) result.points.push_back(mesh.points()[v]);
             v = entry->second;
         }
     }
@@ -176,42 +167,43 @@ Vec3 area(const Triangle& t, const std::vector<Vec3>& at) {
 }
 
 /// Flags for the vertices of a part of another mesh that are nearer to what goes than to what stays, by
-/// triangles that face the same way if there are any, and not within the seam along `border`.
-std::vector<char> coming_vertices(const TriangleMesh& part, const std::vector<Vec3>& points,
-                                  const std::vector<Triangle>& triangles, const std::vector<char>& gone,
-                                  const std::vector<std::pair<int, int>>& border, double seam) {
+/// triangles that face the same way if there are any near, and not within the seam along `border`.
+std::vector<char> coming_vertices(const TriangleMesh& part, const TriangleBins& mesh,
+                                  const std::vector<char>& gone,
+                                  const std::vector<std::pair<int, int>>& border, double spacing) {
+    const std::vector<Vec3>& points = mesh.points();
     std::vector<Vec3> normal(part.points.size(), Vec3::Zero());
-    Box bounds;
-    for (const Triangle& t : part.triangles) {
-        bounds.extend(box_of(t, part.points));
+    for (const Triangle& t : part.triangles)
         for (const int v : t) normal[v] += area(t, part.points);
-    }
-    const Vec3 margin = 0.25 * bounds.sizes();
-    bounds = Box(bounds.min() - margin, bounds.max() + margin);
-    struct Near {
-        Box box;
-        Vec3 area;
-        std::size_t triangle;
-    };
-    std::vector<Near> near;
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        if (const Box box = box_of(triangles[t], points); bounds.intersects(box))
-            near.push_back({box, area(triangles[t], points), t});
+    const double seam = kSeam * spacing, farthest = kMargin * spacing;
     std::vector<char> result(part.points.size());
     tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t v) {
         const Vec3& p = part.points[v];
         double nearest[2] = {kFar, kFar};
-        bool goes[2] = {false, false};  // the nearest that faces another way, and the same way
-        for (const Near& other : near) {
-            const bool same = other.area.dot(normal[v]) > 0.0;
-            if (other.box.squaredExteriorDistance(p) >= nearest[same]) continue;
-            const auto& [i, j, k] = triangles[other.triangle];
-            const double d = squared_distance(p, points[i], points[j], points[k]);
-            if (d < nearest[same]) nearest[same] = d, goes[same] = gone[other.triangle] != 0;
-        }
-        result[v] = goes[nearest[1] < kFar] && std::none_of(border.begin(), border.end(), [&](const auto& e) {
-                        return squared_distance_to_edge(p, points[e.first], points[e.second]) < seam * seam;
-                    });
+        int at[2] = {-1, -1};  // the nearest that faces another way, and the same way
+        bool beside_what_stays = false;
+        mesh.for_each_near(
+            p,
+            [&](int other) {
+                const double to_box = mesh.box_of(other).squaredExteriorDistance(p);
+                beside_what_stays = beside_what_stays || (to_box < seam * seam && !gone[other]);
+                if (to_box >= std::max(nearest[0], nearest[1])) return;
+                const Triangle& t = mesh.triangles()[other];
+                const bool same = area(t, points).dot(normal[v]) > 0.0;
+                if (to_box >= nearest[same]) return;
+                const double d = squared_distance(p, points[t[0]], points[t[1]], points[t[2]]);
+                if (d < nearest[same]) nearest[same] = d, at[same] = other;
+            },
+            [&](double distance) {
+                return nearest[1] <= distance * distance || (at[0] >= 0 && distance >= farthest);
+            });
+        const int decides = at[1] >= 0 ? at[1] : at[0];
+        const auto is_at_border = [&] {
+            return std::any_of(border.begin(), border.end(), [&](const auto& e) {
+                return squared_distance_to_edge(p, points[e.first], points[e.second]) < seam * seam;
+            });
+        };
+        result[v] = decides >= 0 && gone[decides] && !(beside_what_stays && is_at_border());
     });
     return result;
 }
@@ -245,19 +237,39 @@ std::vector<int> matches(const std::vector<Loop>& loops, const std::vector<Loop>
 
 }  // namespace
 
-std::optional<Patch> patch_around(const Vec3& place, double reach, const std::vector<Vec3>& points,
-                                  const std::vector<Triangle>& triangles, const TriangleMesh& fine,
-                                  double spacing) {
+std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh) {
+    const std::vector<Vec3>& points = mesh.points();
+    const Vec3 extent = Vec3::Constant(reach);
+    std::vector<int> result;
+    for (const int t : mesh.meeting(Box(place - extent, place + extent))) {
+        const auto& [i, j, k] = mesh.triangles()[t];
+        if (squared_distance(place, points[i], points[j], points[k]) <= reach * reach) result.push_back(t);
+    }
+    for (std::size_t before = 0; before != result.size();) {
+        before = result.size();
+        for (const int v : pinched(border_of(some_of(mesh.triangles(), result))))
+            for (const int t : mesh.meeting(Box(points[v])))
+                if (has_any(mesh.triangles()[t], {v})) result.push_back(t);
+        std::sort(result.begin(), result.end());
+        result.erase(std::unique(result.begin(), result.end()), result.end());
+    }
+    return result;
+}
+
+std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh,
+                               const TriangleBins& fine, double spacing) {
+    if (gone.empty()) return std::nullopt;
+    const std::vector<Vec3>& points = mesh.points();
     Patch patch;
-    patch.gone = going_around(place, reach, points, triangles);
-    const std::vector<Triangle> going = flagged(triangles, patch.gone);
-    if (going.empty()) return std::nullopt;
+    patch.gone.assign(mesh.triangles().size(), 0);
+    for (const int t : gone) patch.gone[t] = 1;
+    const std::vector<Triangle> going = some_of(mesh.triangles(), gone);
     const auto border = border_of(going);
     Box bounds;
-    for (const Triangle& t : going) bounds.extend(box_of(t, points));
+    for (const int t : gone) bounds.extend(mesh.box_of(t));
     const Vec3 margin = Vec3::Constant(kMargin * spacing);
     TriangleMesh part = part_within(Box(bounds.min() - margin, bounds.max() + margin), fine);
-    const auto comes = coming_vertices(part, points, triangles, patch.gone, border, kSeam * spacing);
+    const auto comes = coming_vertices(part, mesh, patch.gone, border, spacing);
     std::vector<Triangle>& coming = part.triangles;
     const auto leave_out = [&](const auto& is_out) {
         coming.erase(std::remove_if(coming.begin(), coming.end(), is_out), coming.end());
@@ -290,7 +302,9 @@ std::optional<Patch> patch_around(const Vec3& place, double reach, const std::ve
         if (strip.empty()) return std::nullopt;
         patch.triangles.insert(patch.triangles.end(), strip.begin(), strip.end());
     }
-    patch.euler = euler_of(patch.triangles) - euler_of(going);
+    const Numbers now = numbers_of(patch.triangles), before = numbers_of(going);
+    patch.components = now.components - before.components;
+    patch.euler = now.euler - before.euler;
     patch.points = std::move(part.points);
     return patch;
 }

@@ -42,11 +42,19 @@ bool MeshTrials::try_to_mend(FrameMesh other) {
     return failing > 0 && take(std::move(other), failing - 1);
 }
 
+void MeshTrials::put_back(FrameMesh mesh) {
+    mesh_ = std::move(mesh);
+    inspection_ = inspector_.inspect_both_ways(mesh_);
+    inspector_.inspect_topology(mesh_, inspection_);
+}
+
 bool MeshTrials::take(FrameMesh other, std::size_t most_failing) {
     Inspection after = inspector_.inspect_both_ways(other);
     inspector_.look_between(other, after);
     const bool good =
         largest_error(after) <= std::max(kCertified * limits_.tolerance, largest_error(inspection_)) &&
+        after.farthest_crossing <= std::max(limits_.tolerance, inspection_.farthest_crossing) &&
+        after.lost_crossings <= inspection_.lost_crossings &&
         failing_in(after, limits_.tolerance).size() <= most_failing &&
         inspector_.newly_missed(after, mesh_.vertices, mesh_.carved.triangles).empty();
     if (good) {
@@ -54,7 +62,11 @@ bool MeshTrials::take(FrameMesh other, std::size_t most_failing) {
         mesh_ = std::move(other);
         inspection_ = std::move(after);
     } else {
-        inspector_.inspect_both_ways(mesh_);  // what it saw last was another
+        // What it saw last was another, for which it may have looked at more points.
+        Inspection now = inspector_.inspect_both_ways(mesh_);
+        now.topology = std::move(inspection_.topology);
+        now.doubtful = std::move(inspection_.doubtful);
+        inspection_ = std::move(now);
     }
     return good;
 }

@@ -19,11 +19,13 @@ public:
     /// It saw the mesh last.
     Inspector& inspector() { return inspector_; }
 
-    /// Takes a mesh if it misses nothing that the one there does not, and if its largest error is within the
-    /// tolerance or no larger. Returns whether it did.
+    /// Takes a mesh if it misses nothing that the one there does not, and if its largest distances either way
+    /// are within the tolerance or no larger. Returns whether it did.
     bool try_mesh(FrameMesh other);
     /// Takes a mesh if moreover it fails at fewer places.
     bool try_to_mend(FrameMesh other);
+    /// Takes a mesh that was there before.
+    void put_back(FrameMesh mesh);
     /// Where a triangle is too far off, and what is missed.
     std::vector<Vec3> failing_places() const;
 

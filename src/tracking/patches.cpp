@@ -1,8 +1,11 @@
 #include "tracking/patches.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "component_boxes.h"
@@ -19,20 +22,33 @@ constexpr double kSmall = 3.5;  // reach of the pieces of the mesh that are look
 constexpr double kThin = 2.0;   // sheets no farther apart
 constexpr double kApart = 1.5;  // places that near are one
 constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
-constexpr double kHarmlessReach = 2.0;
-constexpr std::size_t kFewPlaces = 4;
 constexpr double kLatticeReach = 24.0;
 constexpr double kFarthestFailing = 3.5;
-constexpr std::size_t kMostFailing = 64;
-constexpr std::size_t kMostWork = 20000000;  // triangles looked at, each as often as it is
+constexpr double kFlat = 1e-3;  // twice the area over the square of the longest edge
+constexpr std::size_t kFewPlaces = 4;
+constexpr std::size_t kMostFailing = 64, kMostPlaces = 300;
+constexpr int kMostPatches = 600, kMostRefused = 50;  // that are made, and whose meshes are inspected
+constexpr std::size_t kMostTriangles = 10000000;      // of the whole meshes they make
+constexpr std::size_t kMostPairs = 100000000;         // of components
 
 /// Those of some places that are not near to one before.
 std::vector<Vec3> apart(const std::vector<Vec3>& places, double distance) {
+    std::map<std::array<double, 3>, std::vector<Vec3>> in_cube;
     std::vector<Vec3> result;
-    for (const Vec3& place : places)
-        if (std::none_of(result.begin(), result.end(),
-                         [&](const Vec3& other) { return (other - place).norm() < distance; }))
-            result.push_back(place);
+    for (const Vec3& place : places) {
+        const Vec3 cube = (place / distance).array().floor();
+        bool is_near = false;
+        for (int n = 0; n < 27; ++n) {
+            const Vec3 other = cube + Vec3(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
+            const auto found = in_cube.find({other.x(), other.y(), other.z()});
+            is_near = is_near || (found != in_cube.end() &&
+                                  std::any_of(found->second.begin(), found->second.end(),
+                                              [&](const Vec3& p) { return (p - place).norm() < distance; }));
+        }
+        if (is_near) continue;
+        in_cube[{cube.x(), cube.y(), cube.z()}].push_back(place);
+        result.push_back(place);
+    }
     return result;
 }
 
@@ -60,7 +76,7 @@ std::vector<Vec3> unmatched_components(const FrameMesh& mesh, const std::vector<
     };
     take_small(component_boxes<3>(mesh.vertices, mesh.carved.triangles), ours);
     take_small(of_lattice, theirs);
-    if (ours.size() * theirs.size() > kMostWork) return result;
+    if (ours.size() * theirs.size() > kMostPairs) return result;
     const auto take_unmatched = [&](const std::vector<Vec3>& some, const std::vector<Vec3>& others) {
         for (const Vec3& one : some)
             if (std::none_of(others.begin(), others.end(),
@@ -90,22 +106,93 @@ bool crosses(const Patch& patch, const FrameMesh& mesh) {
     return any_cross(points, patch.triangles, rest);
 }
 
+/// Whether a triangle of a patch has hardly any area, as where the surface passes through a lattice node.
+bool has_flat_triangle(const Patch& patch, const FrameMesh& mesh) {
+    const auto at = [&](int v) -> const Vec3& {
+        const auto coming = static_cast<std::size_t>(v) - mesh.vertices.size();
+        return static_cast<std::size_t>(v) < mesh.vertices.size() ? mesh.vertices[v] : patch.points[coming];
+    };
+    return std::any_of(patch.triangles.begin(), patch.triangles.end(), [&](const Triangle& t) {
+        const Vec3 a = at(t[1]) - at(t[0]), b = at(t[2]) - at(t[0]);
+        const double longest2 = std::max({a.squaredNorm(), b.squaredNorm(), (b - a).squaredNorm()});
+        return !(a.cross(b).norm() > kFlat * longest2);
+    });
+}
+
 /// Whether there are only a few, where patches would change nothing: the numbers of the whole lattice are
 /// dearer.
 bool are_harmless(const std::vector<Vec3>& places, const FrameMesh& mesh, const Surface& surface) {
     if (places.size() > kFewPlaces) return false;
     const double resolution = surface.resolution();
-    const TriangleMesh lattice = surface.lattice_mesh(places, 4.0 * kHarmlessReach * resolution);
+    const TriangleMesh lattice = surface.lattice_mesh(places, 4.0 * kSmall * resolution);
+    const TriangleBins bins(mesh.vertices, mesh.carved.triangles, resolution),
+        lattice_bins(lattice.points, lattice.triangles, resolution);
     return std::all_of(places.begin(), places.end(), [&](const Vec3& place) {
-        const auto patch = patch_around(place, kHarmlessReach * resolution, mesh.vertices,
-                                        mesh.carved.triangles, lattice, resolution);
-        return patch && patch->euler == 0;
+        const auto patch =
+            patch_for(triangles_around(place, kSmall * resolution, bins), bins, lattice_bins, resolution);
+        return patch && patch->euler == 0 && patch->components == 0;
     });
 }
 
 bool is_sound(const MeshTopology& topology) {
     return topology.closed() && topology.oriented() && topology.manifold();
 }
+
+/// Patches of one mesh, which becomes another where one is taken.
+class Patcher {
+public:
+    Patcher(MeshTrials& trials, const std::vector<Vec3>& places, const Surface& surface)
+        : trials_(trials),
+          resolution_(surface.resolution()),
+          lattice_(surface.lattice_mesh(places, kLatticeReach * resolution_)),
+          lattice_bins_(lattice_.points, lattice_.triangles, resolution_) {}
+
+    /// What is known of the mesh, which is another now.
+    void forget() {
+        bins_.reset();
+        tried_.clear();
+    }
+    bool is_worn_out() const {
+        return patches_ == kMostPatches || refused_ == kMostRefused || triangles_ > kMostTriangles;
+    }
+
+    /// Takes the patch within `reach` resolutions of a place if it is wanted by its own numbers and then by
+    /// those of the whole mesh, if it crosses nothing, and if its mesh is taken: `try_mesh`. Returns whether;
+    /// nullopt where it was wanted and failed.
+    template <typename IsWanted, typename AreWanted, typename TryMesh>
+    std::optional<bool> patch_at(const Vec3& place, double reach, const IsWanted& is_wanted,
+                                 const AreWanted& are_wanted, const TryMesh& try_mesh) {
+        const FrameMesh& mesh = trials_.mesh();
+        if (!bins_) bins_.emplace(mesh.vertices, mesh.carved.triangles, 0.5 * resolution_);
+        std::vector<int> gone = triangles_around(place, reach * resolution_, *bins_);
+        if (tried_.count(gone) > 0) return false;
+        ++patches_;
+        const auto patch = patch_for(gone, *bins_, lattice_bins_, resolution_);
+        tried_.insert(std::move(gone));
+        if (!patch || !is_wanted(*patch)) return false;
+        triangles_ += mesh.carved.triangles.size();
+        FrameMesh other = patched(mesh, *patch);
+        const MeshTopology topology = topology_of(other);
+        if (!is_sound(topology) || !are_wanted(topology)) return false;
+        if (has_flat_triangle(*patch, mesh) || crosses(*patch, mesh)) return std::nullopt;
+        if (!try_mesh(std::move(other))) {
+            ++refused_;
+            return std::nullopt;
+        }
+        forget();
+        return true;
+    }
+
+private:
+    MeshTrials& trials_;
+    const double resolution_;
+    const TriangleMesh lattice_;
+    const TriangleBins lattice_bins_;
+    std::optional<TriangleBins> bins_;  // of the mesh as it is
+    std::set<std::vector<int>> tried_;  // triangles of it that went
+    int patches_ = 0, refused_ = 0;
+    std::size_t triangles_ = 0;  // of whole meshes
+};
 
 }  // namespace
 
@@ -127,60 +214,81 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     if (now == 0) return 0;
     const std::vector<Vec3> unmatched = unmatched_components(trials.mesh(), wanted->components, resolution);
     places.insert(places.end(), unmatched.begin(), unmatched.end());
-    const TriangleMesh lattice = surface.lattice_mesh(places, kLatticeReach * resolution);
-    std::size_t count = 0, work = 0;
-    std::vector<Vec3> around;  // places where a patch would be right, but did not fit
-    const auto patch_at = [&](const Vec3& place, double reach) {
-        const auto patch = patch_around(place, reach, trials.mesh().vertices, trials.mesh().carved.triangles,
-                                        lattice, resolution);
-        work += trials.mesh().carved.triangles.size();
-        if (!patch || patch->euler == 0) return;
-        FrameMesh other = patched(trials.mesh(), *patch);
-        const MeshTopology topology = topology_of(other);
-        const long then = astray(topology);
-        if (then >= now || !is_sound(topology)) return;
-        if (crosses(*patch, trials.mesh()) || !trials.try_mesh(std::move(other))) {
+    if (places.size() > kMostPlaces) places.resize(kMostPlaces);
+    Patcher patcher(trials, places, surface);
+    std::size_t count = 0;
+    std::set<std::array<double, 3>> around;  // vertices where a patch would be right, but did not fit
+    const auto patch_at = [&](const Vec3& place, double reach, long most) {
+        long then = 0;
+        const auto taken = patcher.patch_at(
+            place, reach, [](const Patch& patch) { return patch.euler != 0 || patch.components != 0; },
+            [&](const MeshTopology& topology) { return (then = astray(topology)) <= most; },
+            [&](FrameMesh other) { return trials.try_mesh(std::move(other)); });
+        if (!taken) {
             for (const Vec3& v : trials.mesh().vertices)
-                if ((v - place).norm() < reach) around.push_back(v);
-            return;
+                if ((v - place).norm() < reach * resolution) around.insert({v.x(), v.y(), v.z()});
+        } else if (*taken) {
+            ++count;
+            now = then;
         }
-        ++count;
-        now = then;
     };
-    const auto patch_near = [&](const std::vector<Vec3>& some) {
+    const auto patch_near = [&](const std::vector<Vec3>& some, long worse) {
         for (const double reach : kReaches)
             for (const Vec3& place : some)
-                if (now > 0 && work < kMostWork) patch_at(place, reach * resolution);
+                if (now > 0 && !patcher.is_worn_out()) patch_at(place, reach, now + worse);
+        patcher.forget();
     };
-    patch_near(places);
-    patch_near(apart(std::exchange(around, {}), kApart * resolution));
+    patch_near(places, -1);
+    std::vector<Vec3> more;
+    for (const auto& [x, y, z] : around) more.emplace_back(x, y, z);
+    patch_near(apart(more, kApart * resolution), -1);
+    // Two handles too many here may hide that one is missing elsewhere.
+    patch_near(places, 0);
+    patch_near(places, -1);
     return count;
 }
 
-std::size_t patch_failing(MeshTrials& trials, const Surface& surface) {
+std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface) {
     const double resolution = surface.resolution();
     const std::vector<Vec3> places = apart(trials.failing_places(), kApart * resolution);
     if (places.empty() || places.size() > kMostFailing) return 0;
-    const TriangleMesh lattice = surface.lattice_mesh(places, kLatticeReach * resolution);
-    const std::size_t components = topology_of(trials.mesh()).components;
     const auto is_mended = [&](const Vec3& place) {
         const std::vector<Vec3> failing = trials.failing_places();
         return std::none_of(failing.begin(), failing.end(),
                             [&](const Vec3& other) { return (other - place).norm() < kApart * resolution; });
     };
+    const MeshTopology topology = topology_of(trials.mesh());
+    const auto has_same_numbers = [&](const MeshTopology& other) {
+        return other.components == topology.components && other.euler == topology.euler;
+    };
+    Patcher patcher(trials, places, surface);
     std::size_t count = 0;
-    for (const double reach : kReaches)
-        for (const Vec3& place : places) {
-            if (reach > kFarthestFailing || is_mended(place)) continue;
-            const auto patch = patch_around(place, reach * resolution, trials.mesh().vertices,
-                                            trials.mesh().carved.triangles, lattice, resolution);
-            if (!patch || patch->euler != 0) continue;
-            FrameMesh other = patched(trials.mesh(), *patch);
-            const MeshTopology topology = topology_of(other);
-            if (!is_sound(topology) || topology.components != components || crosses(*patch, trials.mesh()))
-                continue;
-            if (trials.try_to_mend(std::move(other))) ++count;
-        }
+    const auto patch_at = [&](const Vec3& place, double reach, const auto& are_wanted) {
+        return patcher
+            .patch_at(
+                place, reach, [](const Patch&) { return true; }, are_wanted,
+                [&](FrameMesh other) { return trials.try_to_mend(std::move(other)); })
+            .value_or(false);
+    };
+    // Whether then another patch elsewhere brings the numbers back: the mesh had two faults that hid each
+    // other.
+    const auto patch_twice = [&](const Vec3& place, double reach) {
+        FrameMesh before = trials.mesh();
+        if (!patch_at(place, reach, [](const MeshTopology&) { return true; })) return false;
+        patch_topology(trials, thickness, surface);
+        const bool good = has_same_numbers(topology_of(trials.mesh()));
+        if (!good) trials.put_back(std::move(before));
+        patcher.forget();
+        return good;
+    };
+    for (const bool alone : {true, false}) {
+        for (const double reach : kReaches)
+            for (const Vec3& place : places) {
+                if (reach > kFarthestFailing || is_mended(place) || patcher.is_worn_out()) continue;
+                count += alone ? patch_at(place, reach, has_same_numbers) : patch_twice(place, reach);
+            }
+        patcher.forget();
+    }
     return count;
 }
 

@@ -484,7 +484,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         MeshTrials of_mesh(mesh, inspection, *inspector, l);
         patch_topology(of_mesh, last_mesh.evidence.thickness, surface);
         inspector->look_off_surface(mesh, inspection);
-        patch_failing(of_mesh, surface);
+        patch_failing(of_mesh, last_mesh.evidence.thickness, surface);
     }
     frame.relocated += dt->profile().relocated - relocated;
     inherit_velocities(particle_triangles(mesh.carved), first_new);

@@ -34,13 +34,20 @@ void expect_sound(const TriangleMesh& mesh, std::size_t components, long euler) 
     EXPECT_TRUE(self_intersections(mesh).empty());
 }
 
+std::optional<Patch> patch_around(const Vec3& place, double reach, const TriangleMesh& mesh,
+                                  const TriangleMesh& fine, double spacing) {
+    const TriangleBins bins(mesh.points, mesh.triangles, spacing);
+    return patch_for(triangles_around(place, reach, bins), bins,
+                     TriangleBins(fine.points, fine.triangles, spacing), spacing);
+}
+
 TEST(Patch, BringsAFinerPartOfTheSameSphere) {
     const TriangleMesh sphere = support::icosphere(2), fine = support::icosphere(5);
     constexpr double kSpacing = 0.04;
     const double volume = enclosed_volume(sphere);
     for (const double reach : {0.05, 0.3, 0.8, 1.5})
         for (const Vec3& place : {Vec3(0, 0, 1), Vec3(0.6, -0.48, 0.64), Vec3(-0.9, 0.1, 0.3)}) {
-            const auto patch = patch_around(place, reach, sphere.points, sphere.triangles, fine, kSpacing);
+            const auto patch = patch_around(place, reach, sphere, fine, kSpacing);
             ASSERT_TRUE(patch.has_value()) << reach;
             EXPECT_EQ(patch->euler, 0);
             for (std::size_t t = 0; t < sphere.triangles.size(); ++t) {
@@ -58,7 +65,7 @@ TEST(Patch, BringsAFinerPartOfTheSameSphere) {
 
 TEST(Patch, BringsAWholeComponentWhereAllOfItGoes) {
     const TriangleMesh ball = support::icosphere(1), fine = support::icosphere(3);
-    const auto patch = patch_around({0, 0, 0}, 2.0, ball.points, ball.triangles, fine, 0.2);
+    const auto patch = patch_around({0, 0, 0}, 2.0, ball, fine, 0.2);
     ASSERT_TRUE(patch.has_value());
     EXPECT_EQ(std::count(patch->gone.begin(), patch->gone.end(), 0), 0);
     expect_sound(patched(ball, *patch), 1, 2);
@@ -67,9 +74,8 @@ TEST(Patch, BringsAWholeComponentWhereAllOfItGoes) {
 
 TEST(Patch, IsNoneWhereTheOtherMeshIsElsewhere) {
     const TriangleMesh sphere = support::icosphere(2);
-    EXPECT_FALSE(
-        patch_around({0, 0, 1}, 0.3, sphere.points, sphere.triangles, support::icosphere(4, {9, 0, 0}), 0.1));
-    EXPECT_FALSE(patch_around({0, 0, 5}, 0.3, sphere.points, sphere.triangles, support::icosphere(4), 0.1));
+    EXPECT_FALSE(patch_around({0, 0, 1}, 0.3, sphere, support::icosphere(4, {9, 0, 0}), 0.1));
+    EXPECT_FALSE(patch_around({0, 0, 5}, 0.3, sphere, support::icosphere(4), 0.1));
 }
 
 /// Two balls, and a bar between them where `joined`.
@@ -96,11 +102,11 @@ TEST(Patch, BringsTheOtherMeshsTopology) {
     const TriangleMesh apart = two_balls(false), joined = two_balls(true);
     ASSERT_EQ(mesh_topology(apart).components, 2u);
     ASSERT_EQ(mesh_topology(joined).components, 1u);
-    const auto join = patch_around({0, 0, 0}, 5.0, apart.points, apart.triangles, joined, 1.0);
+    const auto join = patch_around({0, 0, 0}, 5.0, apart, joined, 1.0);
     ASSERT_TRUE(join.has_value());
     EXPECT_EQ(join->euler, -2);
     expect_sound(patched(apart, *join), 1, 2);
-    const auto part = patch_around({0, 0, 0}, 5.0, joined.points, joined.triangles, apart, 1.0);
+    const auto part = patch_around({0, 0, 0}, 5.0, joined, apart, 1.0);
     ASSERT_TRUE(part.has_value());
     EXPECT_EQ(part->euler, 2);
     expect_sound(patched(joined, *part), 2, 4);

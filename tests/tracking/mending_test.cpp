@@ -1,6 +1,7 @@
 // What mends a frame's mesh or makes it better, on meshes whose faults are known.
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -431,6 +432,53 @@ TEST(Patches, PartADropFromABallWhereNoNodeTellsThemApart) {
     expect_sound(mesh);
 }
 
+TEST(Patches, AreTheSameAtAnyNumberOfThreads) {
+    const LevelSet surface(thin_disk_and_ball());
+    const auto patched = [&](std::size_t threads) {
+        const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+        Carved carved(surface, 0.5, 0.8);
+        for (int c = 0; c < static_cast<int>(carved.labels.size()); ++c)
+            if (carved.labels[c] && (carved.centroid(c) - Vec3(0.5, 0.5, 0.0)).norm() < 0.6)
+                carved.labels[c] = 0;
+        FrameMesh mesh = carved.mesh();
+        Inspected now(carved, mesh);
+        patch_topology(now.trials, std::vector<double>(carved.particles.size(), 0.3), surface);
+        return mesh;
+    };
+    const FrameMesh one = patched(1), two = patched(2);
+    EXPECT_EQ(one.vertices, two.vertices);
+    EXPECT_EQ(one.carved.triangles, two.carved.triangles);
+}
+
+TEST(MeshTrials, TakeNoMeshThatIsFartherOffOrMissesMore) {
+    const LevelSet surface(grid_of(to_balls));
+    const Carved carved(surface, 0.5, 0.8);
+    FrameMesh mesh = carved.mesh();
+    const FrameMesh before = mesh;
+    Inspected now(carved, mesh);
+    const auto farthest = std::max_element(mesh.vertices.begin(), mesh.vertices.end(),
+                                           [](const Vec3& a, const Vec3& b) { return a.y() < b.y(); }) -
+                          mesh.vertices.begin();
+    for (const double dent : {0.9, -0.9}) {
+        FrameMesh other = before;
+        other.vertices[farthest].y() -= dent;
+        EXPECT_FALSE(now.trials.try_mesh(other));
+    }
+    // Without the drop: no triangle is farther off.
+    std::vector<char> of_drop;
+    for (const Triangle& t : before.carved.triangles) of_drop.push_back(before.vertices[t[0]].x() > 6.3);
+    EXPECT_FALSE(now.trials.try_mesh(without(before, of_drop)));
+    EXPECT_EQ(mesh.vertices, before.vertices);
+    EXPECT_EQ(now.inspection.errors->size(), before.carved.triangles.size());
+    EXPECT_TRUE(now.inspection.missed.empty());
+
+    FrameMesh nearer = before;
+    std::swap(nearer.carved.triangles.front(), nearer.carved.triangles.back());
+    EXPECT_TRUE(now.trials.try_mesh(nearer));
+    EXPECT_FALSE(now.trials.try_to_mend(before));  // nothing fails
+    EXPECT_EQ(mesh.carved.triangles, nearer.carved.triangles);
+}
+
 TEST(Patches, MendWhatIsTooFarOffAndLeaveTheRest) {
     const LevelSet surface(grid_of(to_balls));
     const Carved carved(surface, 0.5, 0.8);
@@ -442,8 +490,9 @@ TEST(Patches, MendWhatIsTooFarOffAndLeaveTheRest) {
     const Vec3 place = *dent;
     const MeshTopology topology = topology_of(mesh);
     Inspected now(carved, mesh);
+    const std::vector<double> thickness(carved.particles.size(), 9.0);
     ASSERT_FALSE(now.trials.failing_places().empty());
-    EXPECT_GT(patch_failing(now.trials, surface), 0u);
+    EXPECT_GT(patch_failing(now.trials, thickness, surface), 0u);
 
     EXPECT_TRUE(now.trials.failing_places().empty());
     for (const auto& [i, j, k] : mesh.carved.triangles)
@@ -458,7 +507,7 @@ TEST(Patches, MendWhatIsTooFarOffAndLeaveTheRest) {
     };
     for (const Vec3& v : before.vertices) EXPECT_TRUE((v - place).norm() < 4.0 || has(mesh, v));
     // Now there is nothing to mend.
-    EXPECT_EQ(patch_failing(now.trials, surface), 0u);
+    EXPECT_EQ(patch_failing(now.trials, thickness, surface), 0u);
 }
 
 /// A ball with a spike of one line of nodes.

@@ -13,7 +13,7 @@ namespace isotrack {
 
 /// How far a triangle is from the surface. World units.
 struct TriangleError {
-    double largest = 0.0;  ///< Of |value| at the sample points.
+    double largest = 0.0;  ///< Of |farther value| at the sample points.
     double mean_square = 0.0;
     Vec3 where = Vec3::Zero();  ///< The sample point with the largest.
 };

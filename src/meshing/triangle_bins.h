@@ -1,0 +1,69 @@
+// The triangles of a mesh by where they are.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+/// In cubes of one size. Read-only, so threads may share it.
+class TriangleBins {
+public:
+    /// Both vectors must outlive it. `size`: the least edge of a cube; more for large triangles, and so that
+    /// there are no more cubes than a few for each triangle.
+    TriangleBins(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles, double size);
+
+    const std::vector<Vec3>& points() const { return points_; }
+    const std::vector<Triangle>& triangles() const { return triangles_; }
+    Box box_of(int triangle) const {
+        const auto& [i, j, k] = triangles_[triangle];
+        return Box(points_[i].cwiseMin(points_[j]).cwiseMin(points_[k]),
+                   points_[i].cwiseMax(points_[j]).cwiseMax(points_[k]));
+    }
+
+    /// Those whose boxes meet this one, ascending.
+    std::vector<int> meeting(const Box& box) const;
+
+    /// Calls `visit(triangle)` with those in cubes around a place, then with those in more cubes, and so on,
+    /// some more than once: until `is_enough(distance)` holds for a distance within which all were visited,
+    /// or all were.
+    template <typename Visit, typename IsEnough>
+    void for_each_near(const Vec3& place, const Visit& visit, const IsEnough& is_enough) const {
+        for (double distance = size_;; distance *= 2.0) {
+            const Range range =
+                range_of(Box(place - Vec3::Constant(distance), place + Vec3::Constant(distance)));
+            for_each_in(range, visit);
+            if (is_enough(distance) || ((range.from == 0).all() && (range.to == count_ - 1).all())) return;
+        }
+    }
+
+private:
+    struct Range {
+        Eigen::Array3i from, to;  // inclusive
+    };
+    Range range_of(const Box& box) const;
+    template <typename Visit>
+    void for_each_in(const Range& range, const Visit& visit) const {
+        for (int x = range.from.x(); x <= range.to.x(); ++x)
+            for (int y = range.from.y(); y <= range.to.y(); ++y)
+                for (int z = range.from.z(); z <= range.to.z(); ++z) {
+                    const std::size_t cube = number(x, y, z);
+                    std::for_each(members_.begin() + first_[cube], members_.begin() + first_[cube + 1],
+                                  visit);
+                }
+    }
+    std::size_t number(int x, int y, int z) const {
+        return (static_cast<std::size_t>(x) * count_.y() + y) * count_.z() + z;
+    }
+
+    const std::vector<Vec3>& points_;
+    const std::vector<Triangle>& triangles_;
+    Vec3 low_ = Vec3::Zero();
+    double size_;
+    Eigen::Array3i count_ = {1, 1, 1};
+    std::vector<int> first_, members_;  // of each cube, and the end
+};
+
+}  // namespace isotrack

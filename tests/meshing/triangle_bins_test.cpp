@@ -1,0 +1,80 @@
+// Triangles near a place, against looking at all of them.
+#include "meshing/triangle_bins.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <random>
+
+#include "meshing/triangle_distance.h"
+#include "support/meshes.h"
+
+namespace isotrack {
+namespace {
+
+class InTriangleBins : public ::testing::TestWithParam<double> {
+protected:
+    /// A sphere of small triangles, and one as large as all.
+    InTriangleBins() : mesh(support::icosphere(3)) {
+        const int first = static_cast<int>(mesh.points.size());
+        mesh.points.insert(mesh.points.end(), {Vec3(-3, -2, -1), Vec3(3, -1, 0), Vec3(0, 3, 2)});
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    Vec3 place() {
+        std::uniform_real_distribution<double> uniform(-2.0, 2.0);
+        return {uniform(random), uniform(random), uniform(random)};
+    }
+
+    TriangleMesh mesh;
+    std::mt19937 random{3};
+};
+
+TEST_P(InTriangleBins, ThoseThatMeetABoxAreFound) {
+    const TriangleBins bins(mesh.points, mesh.triangles, GetParam());
+    std::uniform_real_distribution<double> size(0.0, 0.6);
+    std::size_t found = 0;
+    for (int round = 0; round < 200; ++round) {
+        const Vec3 low = place();
+        const Box box(low, low + Vec3(size(random), size(random), size(random)));
+        std::vector<int> expected;
+        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+            Box own;
+            for (const int v : mesh.triangles[t]) own.extend(mesh.points[v]);
+            if (own.intersects(box)) expected.push_back(static_cast<int>(t));
+        }
+        EXPECT_EQ(bins.meeting(box), expected);
+        found += expected.size();
+    }
+    EXPECT_GT(found, 200u);
+}
+
+TEST_P(InTriangleBins, TheNearestIsFound) {
+    const TriangleBins bins(mesh.points, mesh.triangles, GetParam());
+    for (int round = 0; round < 200; ++round) {
+        const Vec3 p = place();
+        const auto distance2 = [&](std::size_t t) {
+            const auto& [i, j, k] = mesh.triangles[t];
+            return squared_distance(p, mesh.points[i], mesh.points[j], mesh.points[k]);
+        };
+        double expected = std::numeric_limits<double>::infinity(), found = expected;
+        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) expected = std::min(expected, distance2(t));
+        bins.for_each_near(
+            p, [&](int t) { found = std::min(found, distance2(static_cast<std::size_t>(t))); },
+            [&](double distance) { return found <= distance * distance; });
+        EXPECT_EQ(found, expected);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(OfSize, InTriangleBins, ::testing::Values(1e-3, 0.1, 1.0, 100.0));
+
+TEST(TriangleBins, MayBeEmpty) {
+    const TriangleMesh none;
+    const TriangleBins bins(none.points, none.triangles, 1.0);
+    EXPECT_TRUE(bins.meeting(Box(Vec3(-1, -1, -1), Vec3(1, 1, 1))).empty());
+    bins.for_each_near(
+        Vec3::Zero(), [](int) { ADD_FAILURE(); }, [](double) { return false; });
+}
+
+}  // namespace
+}  // namespace isotrack
