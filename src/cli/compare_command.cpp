@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "cli/finite.h"
 #include "cli/table.h"
 #include "io/atomic_file.h"
 #include "isotrack/compare/baselines.h"
@@ -220,7 +221,9 @@ void add_compare_command(CLI::App& app, int& result) {
                             "Our meshes, with #### for the frame number; without it they are made here");
     compare->add_option("--frames", arguments->frames, "A:B or A:B:STEP, ends included");
     compare->add_option("--grid", arguments->grid, "Level-set grid, NAME or NAME[i]");
-    compare->add_option("--iso", arguments->iso, "Grid value of the surface")->capture_default_str();
+    compare->add_option("--iso", arguments->iso, "Grid value of the surface")
+        ->check(finite())
+        ->capture_default_str();
     compare
         ->add_option("--adaptivity", arguments->adaptivity,
                      "volumeToMesh is measured at 0 and at this, 0 to 1")

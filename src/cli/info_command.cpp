@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/finite.h"
 #include "isotrack/error.h"
 #include "isotrack/io/sequence.h"
 #include "isotrack/io/vdb_file.h"
@@ -193,7 +194,9 @@ void add_info_command(CLI::App& app, int& result) {
         ->required();
     info->add_option("--frames", arguments->frames, "A:B or A:B:STEP, ends included");
     info->add_option("--grid", arguments->grid, "Level-set grid, NAME or NAME[i]");
-    info->add_option("--iso", arguments->iso, "Grid value of the surface")->capture_default_str();
+    info->add_option("--iso", arguments->iso, "Grid value of the surface")
+        ->check(finite())
+        ->capture_default_str();
     info->add_flag("--json", arguments->json, "One JSON object instead of tables");
     info->callback([arguments, &result] { result = run(*arguments); });
 }

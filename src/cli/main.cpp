@@ -1,4 +1,5 @@
-// The program `isotrack`: finds the subcommand, runs it, turns what was thrown into one line and an exit code.
+// The program `isotrack`: finds the subcommand, runs it, turns what was thrown into one line and an exit
+// code.
 #include <openvdb/openvdb.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -27,13 +28,17 @@ int main(int argc, char** argv) {
     app.failure_message(CLI::FailureMessage::simple);
     app.add_flag("-q,--quiet", quiet, "Only errors on stderr");
     app.add_flag("-v,--verbose", verbosity, "More on stderr");
-    app.add_option("--threads", threads, "Threads to use; 0: one per core")->check(CLI::NonNegativeNumber)->capture_default_str();
+    app.add_option("--threads", threads, "Threads to use; 0: one per core")
+        ->check(CLI::Range(0, 1024))
+        ->capture_default_str();
 
     spdlog::set_default_logger(spdlog::stderr_color_mt("isotrack"));
     spdlog::set_pattern("%^%l%$: %v");
     std::optional<tbb::global_control> thread_limit;
     app.parse_complete_callback([&] {
-        spdlog::set_level(quiet ? spdlog::level::err : verbosity > 0 ? spdlog::level::debug : spdlog::level::info);
+        spdlog::set_level(quiet           ? spdlog::level::err
+                          : verbosity > 0 ? spdlog::level::debug
+                                          : spdlog::level::info);
         const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
         thread_limit.emplace(tbb::global_control::max_allowed_parallelism, threads > 0 ? threads : cores);
     });

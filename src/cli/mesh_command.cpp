@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/finite.h"
 #include "isotrack/tracking/mesh_sequence.h"
 
 namespace isotrack::cli {
@@ -152,7 +153,9 @@ void add_mesh_command(CLI::App& app, int& result) {
     mesh->add_option("--frames", a->frames, "A:B or A:B:STEP, ends included");
     mesh->add_option("--grid", a->grid, "Level-set grid, NAME or NAME[i]");
     mesh->add_option("--velocity-grid", a->velocity_grid, "Velocity grid, NAME or NAME[i]");
-    mesh->add_option("--iso", a->options.iso, "Grid value of the surface")->capture_default_str();
+    mesh->add_option("--iso", a->options.iso, "Grid value of the surface")
+        ->check(finite())
+        ->capture_default_str();
     mesh->add_option("--fps", a->fps, "Frames per second: velocities are then per second, else per frame");
     const std::map<std::string, Method> methods{{"tolerance", Method::Tolerance}, {"paper", Method::Paper}};
     mesh->add_option("--method", a->options.method, "How particles are spaced: tolerance or paper")

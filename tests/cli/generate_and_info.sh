@@ -22,6 +22,9 @@ expect 0 '' "$program" -q generate torus -o 'again.####.vdb' --frames 1 --voxel 
 expect 2 "unknown shape 'cube', expected one of" "$program" generate cube -o 'c.####.vdb'
 expect 2 'one file for 2 frames' "$program" generate sphere -o c.vdb --frames 2
 expect 2 'voxel size must be from' "$program" generate sphere -o 'c.####.vdb' --voxel 3
+expect 2 'must be a finite number, got nan' "$program" info --iso nan sphere/f.0001.vdb
+expect 2 'must be a finite number, got -inf' "$program" mesh --iso -inf sphere/f.0001.vdb -o s.ply
+expect 2 'not in range' "$program" --threads -3 info sphere/f.0001.vdb
 expect 2 "no file or folder 'nothing.vdb'" "$program" info nothing.vdb
 head -c 100 sphere/f.0001.vdb >half.vdb
 expect 1 "^error: frame 0: cannot read 'half.vdb': .*cut off or damaged" "$program" info half.vdb
