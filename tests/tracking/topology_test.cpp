@@ -1,0 +1,153 @@
+// The topology of whole frames, on surfaces that are hard to hold: that of volumeToMesh, and where no part is
+// thinner than two voxels that of the solid itself.
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <ostream>
+#include <string>
+
+#include "isotrack/compare/baselines.h"
+#include "isotrack/meshing/mesh_topology.h"
+#include "isotrack/meshing/self_intersections.h"
+#include "isotrack/surface/level_set.h"
+#include "isotrack/tracking/tracker.h"
+
+namespace isotrack {
+namespace {
+
+constexpr int kHalf = 26;
+constexpr double kBand = 3.0;
+
+struct Solid {
+    std::string name;
+    std::function<double(const Vec3&)> distance;  // voxels, negative inside; a bound where it is no distance
+    std::size_t components = 0;                   // 0: thinner than two voxels somewhere
+    long euler = 0;
+};
+void PrintTo(const Solid& solid, std::ostream* out) {
+    *out << solid.name;
+}
+
+double ball(const Vec3& p, double radius) {
+    return p.norm() - radius;
+}
+double ring(const Vec3& p, int axis, double major, double minor) {
+    const double height = p[axis], radius = std::hypot(p[(axis + 1) % 3], p[(axis + 2) % 3]);
+    return std::hypot(radius - major, height) - minor;
+}
+double disk(const Vec3& p, double radius, double thickness) {
+    const Vec3 normal = Vec3(0.3, 0.5, 0.8).normalized();
+    const double height = p.dot(normal), beside = (p - height * normal).norm() - radius,
+                 above = std::abs(height) - 0.5 * thickness;
+    return beside > 0.0 && above > 0.0 ? std::hypot(beside, above) : std::max(beside, above);
+}
+
+std::vector<Solid> solids() {
+    std::vector<Solid> result;
+    result.push_back(
+        {"nested_shells",
+         [](const Vec3& p) {
+             const double r = p.norm();
+             return std::min({std::max(r - 21.3, 18.1 - r), std::max(r - 15.2, 12.4 - r), r - 8.6});
+         },
+         5, 10});
+    for (const double thickness : {1.5, 2.2, 3.0})
+        result.push_back({"plate_" + std::to_string(static_cast<int>(10 * thickness)),
+                          [=](const Vec3& p) { return disk(p, 17.3, thickness); },
+                          thickness > 2.0 ? std::size_t{1} : 0, 2});
+    for (const double gap : {0.8, 2.3})
+        result.push_back({"near_balls_" + std::to_string(static_cast<int>(10 * gap)),
+                          [=](const Vec3& p) {
+                              const Vec3 middle = (10.2 + 0.5 * gap) * Vec3(0.7, 0.5, 0.5).normalized();
+                              return std::min(ball(p - middle, 10.2), ball(p + middle, 10.2));
+                          },
+                          gap > 2.0 ? std::size_t{2} : 0, 4});
+    result.push_back({"wires",
+                      [](const Vec3& p) {
+                          return std::min({ring(p - Vec3(0.2, 0.1, 0.3), 0, 16.4, 1.15),
+                                           ring(p - Vec3(8.7, 0.4, 0.2), 1, 11.2, 1.2),
+                                           ring(p + Vec3(9.8, 0.3, 0.1), 2, 9.6, 1.1)});
+                      },
+                      0, 0});
+    result.push_back(
+        {"metaballs",
+         [](const Vec3& p) {
+             double sum = 0.0;
+             for (const Vec3& at : {Vec3(-9, 1, 0), Vec3(8, -3, 2), Vec3(0, 11, -4), Vec3(1, -9, -7)})
+                 sum += std::exp(-(p - at).squaredNorm() / 64.0);
+             return sum > 0.0 ? std::min(8.0 * (0.35 - sum) / std::max(sum, 0.35), kBand) : kBand;
+         },
+         0, 0});
+    result.push_back({"zalesak",
+                      [](const Vec3& p) {
+                          const double slot = std::max(std::abs(p.x() - 0.3) - 2.7, -p.y() - 8.2);
+                          return std::max(ball(p, 16.6), -slot);
+                      },
+                      1, 2});
+    result.push_back(
+        {"truss",
+         [](const Vec3& p) {
+             double nearest = kBand;
+             for (int axis = 0; axis < 3; ++axis)
+                 for (const double u : {-9.3, 9.6})
+                     for (const double w : {-9.4, 9.5}) {
+                         const double from_axis = std::hypot(p[(axis + 1) % 3] - u, p[(axis + 2) % 3] - w);
+                         nearest = std::min(nearest, std::max(from_axis - 1.4, std::abs(p[axis]) - 12.2));
+                     }
+             return nearest;
+         },
+         1, -8});
+    return result;
+}
+
+LevelSet grid_of(const Solid& solid) {
+    auto grid = openvdb::FloatGrid::create(static_cast<float>(kBand));
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    auto values = grid->getAccessor();
+    for (int x = -kHalf; x <= kHalf; ++x)
+        for (int y = -kHalf; y <= kHalf; ++y)
+            for (int z = -kHalf; z <= kHalf; ++z) {
+                const double d = std::clamp(solid.distance(Vec3(x, y, z)), -kBand, kBand);
+                if (std::abs(d) < kBand)
+                    values.setValue({x, y, z}, static_cast<float>(d));
+                else if (d < 0.0)
+                    values.setValueOff({x, y, z}, static_cast<float>(d));
+            }
+    return LevelSet(grid);
+}
+
+class Topology : public ::testing::TestWithParam<Solid> {};
+
+TEST_P(Topology, IsThatOfTheLevelSet) {
+    const LevelSet surface = grid_of(GetParam());
+    const MeshTopology wanted = mesh_topology(volume_to_mesh(surface));
+    if (GetParam().components > 0) {
+        EXPECT_EQ(wanted.components, GetParam().components);
+        EXPECT_EQ(wanted.euler, GetParam().euler);
+    }
+    for (const bool fit : {false, true}) {
+        SCOPED_TRACE(fit ? "--fit" : "plain");
+        TrackerOptions options;
+        options.tolerance = 0.5;
+        options.fit = fit;
+        Tracker tracker(options);
+        for (int frame = 0; frame < 2; ++frame) {  // cold, and warm
+            const TrackedFrame result = tracker.advance(surface);
+            const MeshTopology topology = mesh_topology(result.mesh);
+            EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
+            EXPECT_EQ(topology.components, wanted.components);
+            EXPECT_EQ(topology.euler, wanted.euler);
+            EXPECT_TRUE(self_intersections(result.mesh).empty());
+            EXPECT_TRUE(result.within_tolerance) << result.max_error << ", lost " << result.lost_crossings;
+        }
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, Topology, ::testing::ValuesIn(solids()),
+                         [](const auto& solid) { return solid.param.name; });
+
+}  // namespace
+}  // namespace isotrack
