@@ -146,16 +146,21 @@ std::vector<Triangle> some_of(const std::vector<Triangle>& triangles, const std:
     return result;
 }
 
-/// The triangles of a mesh within a box, with vertices of their own.
-TriangleMesh part_within(const Box& bounds, const TriangleBins& mesh) {
-    TriangleMesh result;
+/// Some triangles with vertices of their own.
+struct Part {
+    std::vector<int> vertices;  // of the mesh they are from
+    std::vector<Triangle> triangles;
+};
+
+Part part_within(const Box& bounds, const TriangleBins& mesh) {
+    Part result;
     std::map<int, int> number;
     for (const int t : mesh.meeting(bounds)) {
         if (!bounds.contains(mesh.box_of(t))) continue;
         result.triangles.push_back(mesh.triangles()[t]);
         for (int& v : result.triangles.back()) {
             const auto [entry, is_new] = number.try_emplace(v, static_cast<int>(number.size()));
-            if (is_new) result.points.push_back(mesh.points()[v]);
+            if (is_new) result.vertices.push_back(v);
             v = entry->second;
         }
     }
@@ -166,45 +171,33 @@ Vec3 area(const Triangle& t, const std::vector<Vec3>& at) {
     return (at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]);
 }
 
-/// Flags for the vertices of a part of another mesh that are nearer to what goes than to what stays, by
-/// triangles that face the same way if there are any near, and not within the seam along `border`.
-std::vector<char> coming_vertices(const TriangleMesh& part, const TriangleBins& mesh,
-                                  const std::vector<char>& gone,
-                                  const std::vector<std::pair<int, int>>& border, double spacing) {
-    const std::vector<Vec3>& points = mesh.points();
-    std::vector<Vec3> normal(part.points.size(), Vec3::Zero());
-    for (const Triangle& t : part.triangles)
-        for (const int v : t) normal[v] += area(t, part.points);
-    const double seam = kSeam * spacing, farthest = kMargin * spacing;
-    std::vector<char> result(part.points.size());
-    tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t v) {
-        const Vec3& p = part.points[v];
-        double nearest[2] = {kFar, kFar};
-        int at[2] = {-1, -1};  // the nearest that faces another way, and the same way
-        bool beside_what_stays = false;
-        mesh.for_each_near(
-            p,
-            [&](int other) {
-                const double to_box = mesh.box_of(other).squaredExteriorDistance(p);
-                beside_what_stays = beside_what_stays || (to_box < seam * seam && !gone[other]);
-                if (to_box >= std::max(nearest[0], nearest[1])) return;
-                const Triangle& t = mesh.triangles()[other];
-                const bool same = area(t, points).dot(normal[v]) > 0.0;
-                if (to_box >= nearest[same]) return;
-                const double d = squared_distance(p, points[t[0]], points[t[1]], points[t[2]]);
-                if (d < nearest[same]) nearest[same] = d, at[same] = other;
-            },
-            [&](double distance) {
-                return nearest[1] <= distance * distance || (at[0] >= 0 && distance >= farthest);
-            });
-        const int decides = at[1] >= 0 ? at[1] : at[0];
-        const auto is_at_border = [&] {
-            return std::any_of(border.begin(), border.end(), [&](const auto& e) {
-                return squared_distance_to_edge(p, points[e.first], points[e.second]) < seam * seam;
-            });
-        };
-        result[v] = decides >= 0 && gone[decides] && !(beside_what_stays && is_at_border());
-    });
+/// The vertices of a source within its seam along some edges, ascending.
+std::vector<int> vertices_along(const std::vector<std::pair<int, int>>& border,
+                                const std::vector<Vec3>& points, const TriangleBins& source, double seam) {
+    std::vector<int> result;
+    for (const auto& [from, to] : border) {
+        const Vec3 &a = points[from], &b = points[to], margin = Vec3::Constant(seam);
+        for (const int t : source.meeting(Box(a.cwiseMin(b) - margin, a.cwiseMax(b) + margin)))
+            for (const int v : source.triangles()[t])
+                if (squared_distance_to_edge(source.points()[v], a, b) < seam * seam) result.push_back(v);
+    }
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+}
+
+/// Flags for the vertices of a part: it is nearer to what goes than to what stays, and not in the seam.
+std::vector<char> coming_vertices(const Part& part, const TriangleBins& mesh, const std::vector<char>& gone,
+                                  const std::vector<std::pair<int, int>>& border, PatchSource& source) {
+    source.look_beside(part.vertices, mesh);
+    const std::vector<int> in_seam =
+        vertices_along(border, mesh.points(), source.bins(), kSeam * source.spacing());
+    std::vector<char> result;
+    for (const int v : part.vertices) {
+        const int beside = source.beside(v);
+        result.push_back(beside >= 0 && gone[beside] &&
+                         !std::binary_search(in_seam.begin(), in_seam.end(), v));
+    }
     return result;
 }
 
@@ -235,7 +228,50 @@ std::vector<int> matches(const std::vector<Loop>& loops, const std::vector<Loop>
     return result;
 }
 
+constexpr int kNotLookedFor = -2;
+
 }  // namespace
+
+PatchSource::PatchSource(TriangleMesh mesh, double spacing)
+    : mesh_(std::move(mesh)),
+      spacing_(spacing),
+      bins_(mesh_.points, mesh_.triangles, spacing),
+      normal_(mesh_.points.size(), Vec3::Zero()),
+      beside_(mesh_.points.size(), kNotLookedFor) {
+    for (const Triangle& t : mesh_.triangles)
+        for (const int v : t) normal_[v] += area(t, mesh_.points);
+}
+
+void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBins& mesh) {
+    const std::vector<Vec3>& points = mesh.points();
+    const double farthest = kMargin * spacing_;
+    tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t i) {
+        const int v = vertices[i];
+        if (beside_[v] != kNotLookedFor) return;
+        const Vec3& p = mesh_.points[v];
+        double nearest[2] = {kFar, kFar};
+        int at[2] = {-1, -1};  // the nearest that faces another way, and the same way
+        mesh.for_each_near(
+            p,
+            [&](int other) {
+                const double to_box = mesh.box_of(other).squaredExteriorDistance(p);
+                if (to_box >= std::max(nearest[0], nearest[1])) return;
+                const Triangle& t = mesh.triangles()[other];
+                const bool same = area(t, points).dot(normal_[v]) > 0.0;
+                if (to_box >= nearest[same]) return;
+                const double d = squared_distance(p, points[t[0]], points[t[1]], points[t[2]]);
+                if (d < nearest[same]) nearest[same] = d, at[same] = other;
+            },
+            [&](double distance) {
+                return nearest[1] <= distance * distance || (at[0] >= 0 && distance >= farthest);
+            });
+        beside_[v] = at[1] >= 0 ? at[1] : at[0];
+    });
+}
+
+void PatchSource::forget() {
+    std::fill(beside_.begin(), beside_.end(), kNotLookedFor);
+}
 
 std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh) {
     const std::vector<Vec3>& points = mesh.points();
@@ -256,8 +292,7 @@ std::vector<int> triangles_around(const Vec3& place, double reach, const Triangl
     return result;
 }
 
-std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh,
-                               const TriangleBins& fine, double spacing) {
+std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source) {
     if (gone.empty()) return std::nullopt;
     const std::vector<Vec3>& points = mesh.points();
     Patch patch;
@@ -267,9 +302,10 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
     const auto border = border_of(going);
     Box bounds;
     for (const int t : gone) bounds.extend(mesh.box_of(t));
-    const Vec3 margin = Vec3::Constant(kMargin * spacing);
-    TriangleMesh part = part_within(Box(bounds.min() - margin, bounds.max() + margin), fine);
-    const auto comes = coming_vertices(part, mesh, patch.gone, border, spacing);
+    const Vec3 margin = Vec3::Constant(kMargin * source.spacing());
+    Part part = part_within(Box(bounds.min() - margin, bounds.max() + margin), source.bins());
+    const auto comes = coming_vertices(part, mesh, patch.gone, border, source);
+    for (const int v : part.vertices) patch.points.push_back(source.bins().points()[v]);
     std::vector<Triangle>& coming = part.triangles;
     const auto leave_out = [&](const auto& is_out) {
         coming.erase(std::remove_if(coming.begin(), coming.end(), is_out), coming.end());
@@ -281,12 +317,12 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
 
     // Pieces without a loop that matches are left out, others must match with all of theirs.
     const std::vector<Loop> outer = loops_of(border), inner = loops_of(border_of(coming));
-    const std::vector<int> match = matches(outer, inner, points, part.points, kFarthest * spacing);
+    const std::vector<int> match = matches(outer, inner, points, patch.points, kFarthest * source.spacing());
     if (match.size() != outer.size()) return std::nullopt;
-    DisjointSets pieces(part.points.size());
+    DisjointSets pieces(part.vertices.size());
     for (const Triangle& t : coming)
         for (const int v : {t[1], t[2]}) pieces.join(t[0], v);
-    std::vector<char> is_matched(part.points.size(), 0), is_out(part.points.size(), 0);
+    std::vector<char> is_matched(part.vertices.size(), 0), is_out(part.vertices.size(), 0);
     const auto piece_of = [&](const Loop& loop) { return pieces.least(loop.front()); };
     for (const int o : match) is_matched[piece_of(inner[o])] = 1;
     for (std::size_t o = 0; o < inner.size(); ++o) {
@@ -298,14 +334,13 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
     const int first = static_cast<int>(points.size());
     for (const auto& [i, j, k] : coming) patch.triangles.push_back({first + i, first + j, first + k});
     for (std::size_t o = 0; o < outer.size(); ++o) {
-        const auto strip = strip_between(outer[o], inner[match[o]], points, part.points, first);
+        const auto strip = strip_between(outer[o], inner[match[o]], points, patch.points, first);
         if (strip.empty()) return std::nullopt;
         patch.triangles.insert(patch.triangles.end(), strip.begin(), strip.end());
     }
     const Numbers now = numbers_of(patch.triangles), before = numbers_of(going);
     patch.components = now.components - before.components;
     patch.euler = now.euler - before.euler;
-    patch.points = std::move(part.points);
     return patch;
 }
 

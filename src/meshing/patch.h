@@ -17,16 +17,41 @@ struct Patch {
     long components = 0, euler = 0;   ///< How much more of them there are in what comes than in what goes.
 };
 
+/// The mesh that patches come from. It remembers what it finds of the one they are for: not for threads to
+/// share.
+class PatchSource {
+public:
+    /// `spacing`: the length of an edge. Closed and manifold around what will go.
+    PatchSource(TriangleMesh mesh, double spacing);
+    PatchSource(const PatchSource&) = delete;
+    PatchSource& operator=(const PatchSource&) = delete;
+
+    double spacing() const { return spacing_; }
+    const TriangleBins& bins() const { return bins_; }
+
+    /// Finds, by several threads, for each of some vertices the triangle of `mesh` that is nearest, among
+    /// those that face the same way if any of them is near; -1 if there is none.
+    void look_beside(const std::vector<int>& vertices, const TriangleBins& mesh);
+    int beside(int vertex) const { return beside_[vertex]; }  ///< As found.
+    /// `mesh` is another now.
+    void forget();
+
+private:
+    TriangleMesh mesh_;
+    double spacing_;
+    TriangleBins bins_;
+    std::vector<Vec3> normal_;
+    std::vector<int> beside_;
+};
+
 /// The triangles of a mesh within `reach` of a place, and those around where their border would be pinched.
 /// Ascending.
 std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh);
 
-/// `gone`, with a border that is pinched nowhere, goes. The triangles of `fine` that are nearest to them
-/// come, less a seam about `spacing` wide, the length of an edge there; strips of triangles fill the seam
-/// from each loop of the one border to one of the other. nullopt where the loops do not match. Both meshes
-/// must be closed and manifold (`fine` around what goes), and so is what they become, but for edges that it
-/// may have twice; it may cross itself.
-std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh,
-                               const TriangleBins& fine, double spacing);
+/// `gone`, with a border that is pinched nowhere, goes. The triangles of `source` that are nearest to them
+/// come, less a seam about as wide as its spacing; strips of triangles fill the seam from each loop of the
+/// one border to one of the other. nullopt where the loops do not match. The mesh must be closed and
+/// manifold, and so is what it becomes, but for edges that it may have twice; it may cross itself.
+std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source);
 
 }  // namespace isotrack

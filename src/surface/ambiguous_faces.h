@@ -35,30 +35,44 @@ inline const std::array<bool, 256> kHasAmbiguousFace = [] {
     return result;
 }();
 
+/// Of the ambiguous face of a cell across `axis`, on `side` (0, 1). `at(i, j, k)`: the value at a node, the
+/// corners being 0 or 1; one step further out is asked for, too.
+template <typename At>
+bool joins_face(const At& at, int axis, int side) {
+    const auto inside = [&](int out, int u, int w) {
+        int i[3];
+        i[axis] = out;
+        i[(axis + 1) % 3] = u;
+        i[(axis + 2) % 3] = w;
+        return static_cast<double>(at(i[0], i[1], i[2])) < 0.0;
+    };
+    const int turned = !inside(side, 0, 0);  // u counts from the other end
+    return joins_diagonal([&](int beyond, int u, int w) {
+        return inside(beyond == 0 ? side - 1 : side + 1, turned ? 1 - u : u, w);
+    });
+}
+
 /// What makes the trilinear value at t in such a cell join what volumeToMesh joins. Where they differ a face
 /// is interpolated on the two triangles along the diagonal of what is joined instead; into the cell that
-/// fades away linearly. 0 on the edges, continuous across faces. `at(i, j, k)`: the value at a node, the
-/// corners being 0 or 1; one step further out is asked for, too.
+/// fades away linearly. 0 on the edges, continuous across faces. `at` as above.
 template <typename At>
 double joining_correction(const At& at, const Vec3& t) {
     double sum = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         const int b = (axis + 1) % 3, c = (axis + 2) % 3;
-        const auto node = [&](int out, int u, int w) {
-            int i[3];
-            i[axis] = out;
-            i[b] = u;
-            i[c] = w;
-            return static_cast<double>(at(i[0], i[1], i[2]));
-        };
         for (const int side : {0, 1}) {
-            const int turned = !(node(side, 0, 0) < 0.0);  // u counts from the other end
-            const double in0 = node(side, turned, 0), in1 = node(side, 1 - turned, 1),
-                         out0 = node(side, 1 - turned, 0), out1 = node(side, turned, 1);
+            const auto value = [&](int u, int w) {
+                int i[3];
+                i[axis] = side;
+                i[b] = u;
+                i[c] = w;
+                return static_cast<double>(at(i[0], i[1], i[2]));
+            };
+            const int turned = !(value(0, 0) < 0.0);  // u counts from the other end
+            const double in0 = value(turned, 0), in1 = value(1 - turned, 1), out0 = value(1 - turned, 0),
+                         out1 = value(turned, 1);
             if (!(in0 < 0.0 && in1 < 0.0 && out0 >= 0.0 && out1 >= 0.0)) continue;
-            const bool joined = joins_diagonal([&](int beyond, int u, int w) {
-                return node(beyond == 0 ? side - 1 : side + 1, turned ? 1 - u : u, w) < 0.0;
-            });
+            const bool joined = joins_face(at, axis, side);
             // Whether the trilinear value keeps its sign on the diagonal.
             const double out = out0 + out1, in = in0 + in1;
             if (joined ? out * out < 4.0 * in0 * in1 : in * in < 4.0 * out0 * out1) continue;

@@ -3,8 +3,10 @@
 #include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "find_in_blocks.h"
+#include "surface/cell_parts.h"
 
 namespace isotrack {
 namespace {
@@ -12,11 +14,9 @@ namespace {
 using openvdb::Coord;
 using openvdb::FloatTree;
 using Leaf = FloatTree::LeafNodeType;
-using Accessor = openvdb::tree::ValueAccessor<const FloatTree, false>;  // unregistered: the tree outlives it
 using Bits = std::uint64_t;
 
-constexpr int kDim = Leaf::DIM;
-static_assert(kDim == 8, "a layer of a leaf is a word");
+constexpr int kDim = LeafSides::kDim;
 constexpr std::size_t kLeavesPerBlock = 64;
 
 /// Calls `visit(bit)` for each that is set.
@@ -33,18 +33,7 @@ int offset_in(int axis, int at, int i) {
     return at * kStride[axis] + u * kStride[axis == 0 ? 1 : 0] + w * kStride[axis == 2 ? 1 : 2];
 }
 
-/// Which nodes of such a layer are inside.
-template <int axis>
-Bits layer(const float* values, int at) {
-    Bits result = 0;
-    for (int i = 0; i < 64; ++i) result |= static_cast<Bits>(values[offset_in(axis, at, i)] < 0.0f) << i;
-    return result;
-}
-Bits layer(const float* values, int axis, int at) {
-    return axis == 0 ? layer<0>(values, at) : axis == 1 ? layer<1>(values, at) : layer<2>(values, at);
-}
-
-void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
+void add_edges_of(const Leaf& leaf, const LeafSides& sides, const FloatTree& tree, TreeReader& reader,
                   std::vector<CrossedEdge>& found) {
     const float* own = leaf.buffer().data();
     const Coord origin = leaf.origin();
@@ -58,10 +47,10 @@ void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
         return of.isValueOn(static_cast<openvdb::Index>(offset));
     };
     constexpr Bits kNotLastY = 0x00ffffffffffffff, kNotLastZ = 0x7f7f7f7f7f7f7f7f;
-    Bits next = layer(own, 0, 0);
+    Bits next = sides.layer(0, 0);
     for (int x = 0; x < kDim; ++x) {
         const Bits here = next;
-        if (x + 1 < kDim) next = layer(own, 0, x + 1);
+        if (x + 1 < kDim) next = sides.layer(0, x + 1);
         const Bits crossed[3] = {here ^ next, (here ^ here >> kDim) & kNotLastY,
                                  (here ^ here >> 1) & kNotLastZ};
         // Of the faces that an edge spans with one along a further axis; those that leave the leaf may be
@@ -92,7 +81,7 @@ void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
             const float tile = tree.getValue(there);
             const bool active = tree.isValueOn(there);
             const int at = up ? kDim - 1 : 0;
-            for_each_bit(layer(own, axis, at) ^ (tile < 0.0f ? ~Bits{0} : 0), [&](int i) {
+            for_each_bit(sides.layer(axis, at) ^ (tile < 0.0f ? ~Bits{0} : 0), [&](int i) {
                 const int offset = offset_in(axis, at, i);
                 Coord from = origin + Leaf::offsetToLocalCoord(offset);
                 if (!up) from[axis] -= 1;
@@ -100,9 +89,9 @@ void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
                     active && is_on(leaf, offset), kNotLookedAt);
             });
         };
-        if (const Leaf* above = accessor.probeConstLeaf(origin + step)) {
+        if (const Leaf* above = reader.probeConstLeaf(origin + step)) {
             const float* other = above->buffer().data();
-            for_each_bit(layer(own, axis, kDim - 1) ^ layer(other, axis, 0), [&](int i) {
+            for_each_bit(sides.layer(axis, kDim - 1) ^ sides.layer(axis, kDim), [&](int i) {
                 const int offset = offset_in(axis, kDim - 1, i), beyond = offset_in(axis, 0, i);
                 add(origin + Leaf::offsetToLocalCoord(offset), axis, own[offset], other[beyond],
                     is_on(leaf, offset) && is_on(*above, beyond), kNotLookedAt);
@@ -110,7 +99,7 @@ void add_edges_of(const Leaf& leaf, const FloatTree& tree, Accessor& accessor,
         } else {
             cross_into_tile(true);
         }
-        if (!accessor.probeConstLeaf(origin - step)) cross_into_tile(false);
+        if (!reader.probeConstLeaf(origin - step)) cross_into_tile(false);
     }
 }
 
@@ -120,16 +109,21 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
     const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
     const std::size_t count = leaves.leafCount();
     std::vector<std::size_t> edges_of(count);  // how many, of each leaf
+    std::vector<long> parts_of(count);
     CrossedEdges result;
     result.edges = find_in_blocks<CrossedEdge>(
         count, kLeavesPerBlock, [&](std::size_t begin, std::size_t end, std::vector<CrossedEdge>& found) {
-            Accessor accessor(tree);
+            TreeReader reader(tree);
             for (std::size_t n = begin; n < end; ++n) {
                 const std::size_t before = found.size();
-                add_edges_of(leaves.leaf(n), tree, accessor, found);
+                const Leaf& leaf = leaves.leaf(n);
+                const LeafSides sides(leaf, reader);
+                add_edges_of(leaf, sides, tree, reader, found);
                 edges_of[n] = found.size() - before;
+                parts_of[n] = cell_parts(leaf, sides, reader);
             }
         });
+    result.cell_parts = std::accumulate(parts_of.begin(), parts_of.end(), 0L);
     std::size_t last = 0;
     for (std::size_t n = 0; n < count; ++n) {
         const std::size_t end = last + edges_of[n];

@@ -37,6 +37,7 @@ struct CrossedEdges {
     };
     std::vector<CrossedEdge> edges;
     std::vector<Part> parts;  ///< One after the other.
+    long cell_parts = 0;      ///< Of all leaves: see cell_parts.h.
 };
 
 /// Every edge with a sign change; values must be finite. Edges between two tiles are not seen: a level set

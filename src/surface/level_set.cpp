@@ -568,12 +568,16 @@ std::vector<Eigen::Vector3i> LevelSet::upright_crossings() const {
         };
     });
 }
-std::optional<Surface::Numbers> LevelSet::lattice_numbers() const {
+std::optional<long> LevelSet::lattice_euler() const {
+    // A vertex for each part of a cell, a quadrangle for each crossed edge, and two edges for every
+    // quadrangle.
+    return impl_->crossed.cell_parts - static_cast<long>(impl_->crossed.edges.size());
+}
+std::optional<std::vector<Box>> LevelSet::lattice_components() const {
     std::vector<openvdb::Vec3s> points;
     std::vector<openvdb::Vec4I> quads;
     openvdb::tools::volumeToMesh(*impl_->grid, points, quads);
-    const long euler = static_cast<long>(points.size()) - static_cast<long>(quads.size());
-    return Numbers{component_boxes<4>(points, quads), euler};  // two edges for every quad
+    return component_boxes<4>(points, quads);
 }
 TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reach) const {
     // Around few places their nodes alone are looked at, and two more to each side.

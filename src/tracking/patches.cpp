@@ -27,9 +27,9 @@ constexpr double kFarthestFailing = 3.5;
 constexpr double kFlat = 1e-3;  // twice the area over the square of the longest edge
 constexpr std::size_t kFewPlaces = 4;
 constexpr std::size_t kMostFailing = 64, kMostPlaces = 300;
-constexpr int kMostPatches = 600, kMostRefused = 50;  // that are made, and whose meshes are inspected
-constexpr std::size_t kMostTriangles = 10000000;      // of the whole meshes they make
-constexpr std::size_t kMostPairs = 100000000;         // of components
+constexpr int kMostPatches = 1000, kMostRefused = 50;  // that are made, and whose meshes are inspected
+constexpr std::size_t kMostTriangles = 10000000;       // of the whole meshes they make
+constexpr std::size_t kMostPairs = 100000000;          // of components
 
 /// Those of some places that are not near to one before.
 std::vector<Vec3> apart(const std::vector<Vec3>& places, double distance) {
@@ -119,19 +119,22 @@ bool has_flat_triangle(const Patch& patch, const FrameMesh& mesh) {
     });
 }
 
-/// Whether there are only a few, where patches would change nothing: the numbers of the whole lattice are
-/// dearer.
-bool are_harmless(const std::vector<Vec3>& places, const FrameMesh& mesh, const Surface& surface) {
-    if (places.size() > kFewPlaces) return false;
+/// Those of some places where a patch would change the numbers, or does not fit.
+std::vector<Vec3> doubtful(const std::vector<Vec3>& places, const FrameMesh& mesh, const Surface& surface) {
     const double resolution = surface.resolution();
-    const TriangleMesh lattice = surface.lattice_mesh(places, 4.0 * kSmall * resolution);
-    const TriangleBins bins(mesh.vertices, mesh.carved.triangles, resolution),
-        lattice_bins(lattice.points, lattice.triangles, resolution);
-    return std::all_of(places.begin(), places.end(), [&](const Vec3& place) {
-        const auto patch =
-            patch_for(triangles_around(place, kSmall * resolution, bins), bins, lattice_bins, resolution);
-        return patch && patch->euler == 0 && patch->components == 0;
-    });
+    PatchSource lattice(surface.lattice_mesh(places, 4.0 * kSmall * resolution), resolution);
+    const TriangleBins bins(mesh.vertices, mesh.carved.triangles, resolution);
+    std::vector<Vec3> result;
+    for (const Vec3& place : places) {
+        const auto patch = patch_for(triangles_around(place, kSmall * resolution, bins), bins, lattice);
+        if (!patch || patch->euler != 0 || patch->components != 0) result.push_back(place);
+    }
+    return result;
+}
+
+/// Of a closed mesh: three halves of an edge for each triangle.
+long euler_of(const FrameMesh& mesh) {
+    return static_cast<long>(mesh.vertices.size()) - static_cast<long>(mesh.carved.triangles.size() / 2);
 }
 
 bool is_sound(const MeshTopology& topology) {
@@ -144,13 +147,15 @@ public:
     Patcher(MeshTrials& trials, const std::vector<Vec3>& places, const Surface& surface)
         : trials_(trials),
           resolution_(surface.resolution()),
-          lattice_(surface.lattice_mesh(places, kLatticeReach * resolution_)),
-          lattice_bins_(lattice_.points, lattice_.triangles, resolution_) {}
+          lattice_(surface.lattice_mesh(places, kLatticeReach * resolution_), resolution_) {}
 
+    /// Patches that were tried count as new.
+    void try_again() { tried_.clear(); }
     /// What is known of the mesh, which is another now.
     void forget() {
         bins_.reset();
-        tried_.clear();
+        lattice_.forget();
+        try_again();
     }
     bool is_worn_out() const {
         return patches_ == kMostPatches || refused_ == kMostRefused || triangles_ > kMostTriangles;
@@ -167,7 +172,7 @@ public:
         std::vector<int> gone = triangles_around(place, reach * resolution_, *bins_);
         if (tried_.count(gone) > 0) return false;
         ++patches_;
-        const auto patch = patch_for(gone, *bins_, lattice_bins_, resolution_);
+        const auto patch = patch_for(gone, *bins_, lattice_);
         tried_.insert(std::move(gone));
         if (!patch || !is_wanted(*patch)) return false;
         triangles_ += mesh.carved.triangles.size();
@@ -186,8 +191,7 @@ public:
 private:
     MeshTrials& trials_;
     const double resolution_;
-    const TriangleMesh lattice_;
-    const TriangleBins lattice_bins_;
+    PatchSource lattice_;
     std::optional<TriangleBins> bins_;  // of the mesh as it is
     std::set<std::vector<int>> tried_;  // triangles of it that went
     int patches_ = 0, refused_ = 0;
@@ -200,21 +204,27 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const double resolution = surface.resolution();
     std::vector<Vec3> places =
         suspicious_places(trials.mesh(), trials.inspection().topology, thickness, resolution);
-    if (places.empty() || are_harmless(places, trials.mesh(), surface)) return 0;
-    const auto wanted = surface.lattice_numbers();
+    const auto euler = surface.lattice_euler();
+    if (!euler) return 0;
+    if (euler_of(trials.mesh()) == *euler &&
+        (places.size() <= kFewPlaces && doubtful(places, trials.mesh(), surface).empty()))
+        return 0;
+    const auto wanted = surface.lattice_components();
     if (!wanted) return 0;
     // Components and handles that are too many or too few.
     const auto astray = [&](const MeshTopology& topology) {
-        const long components =
-                       static_cast<long>(topology.components) - static_cast<long>(wanted->components.size()),
-                   handles = components - (topology.euler - wanted->euler) / 2;
+        const long components = static_cast<long>(topology.components) - static_cast<long>(wanted->size()),
+                   handles = components - (topology.euler - *euler) / 2;
         return std::abs(components) + std::abs(handles);
     };
     long now = astray(topology_of(trials.mesh()));
     if (now == 0) return 0;
-    const std::vector<Vec3> unmatched = unmatched_components(trials.mesh(), wanted->components, resolution);
-    places.insert(places.end(), unmatched.begin(), unmatched.end());
-    if (places.size() > kMostPlaces) places.resize(kMostPlaces);
+    std::vector<Vec3> likely = doubtful(places, trials.mesh(), surface);
+    const std::vector<Vec3> unmatched = unmatched_components(trials.mesh(), *wanted, resolution);
+    for (auto* some : {&likely, &places}) {
+        some->insert(some->end(), unmatched.begin(), unmatched.end());
+        if (some->size() > kMostPlaces) some->resize(kMostPlaces);
+    }
     Patcher patcher(trials, places, surface);
     std::size_t count = 0;
     std::set<std::array<double, 3>> around;  // vertices where a patch would be right, but did not fit
@@ -236,15 +246,17 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         for (const double reach : kReaches)
             for (const Vec3& place : some)
                 if (now > 0 && !patcher.is_worn_out()) patch_at(place, reach, now + worse);
-        patcher.forget();
+        patcher.try_again();
     };
-    patch_near(places, -1);
-    std::vector<Vec3> more;
-    for (const auto& [x, y, z] : around) more.emplace_back(x, y, z);
-    patch_near(apart(more, kApart * resolution), -1);
-    // Two handles too many here may hide that one is missing elsewhere.
-    patch_near(places, 0);
-    patch_near(places, -1);
+    for (const auto* some : {&likely, &places}) {
+        patch_near(*some, -1);
+        std::vector<Vec3> more;
+        for (const auto& [x, y, z] : around) more.emplace_back(x, y, z);
+        patch_near(apart(more, kApart * resolution), -1);
+        // Two handles too many here may hide that one is missing elsewhere.
+        patch_near(*some, 0);
+        patch_near(*some, -1);
+    }
     return count;
 }
 
@@ -287,7 +299,7 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
                 if (reach > kFarthestFailing || is_mended(place) || patcher.is_worn_out()) continue;
                 count += alone ? patch_at(place, reach, has_same_numbers) : patch_twice(place, reach);
             }
-        patcher.forget();
+        patcher.try_again();
     }
     return count;
 }

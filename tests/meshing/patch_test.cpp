@@ -37,8 +37,8 @@ void expect_sound(const TriangleMesh& mesh, std::size_t components, long euler) 
 std::optional<Patch> patch_around(const Vec3& place, double reach, const TriangleMesh& mesh,
                                   const TriangleMesh& fine, double spacing) {
     const TriangleBins bins(mesh.points, mesh.triangles, spacing);
-    return patch_for(triangles_around(place, reach, bins), bins,
-                     TriangleBins(fine.points, fine.triangles, spacing), spacing);
+    PatchSource source(fine, spacing);
+    return patch_for(triangles_around(place, reach, bins), bins, source);
 }
 
 TEST(Patch, BringsAFinerPartOfTheSameSphere) {

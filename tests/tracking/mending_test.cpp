@@ -342,22 +342,23 @@ void expect_sound(const FrameMesh& mesh) {
 /// Takes cells near a place out of a surface's mesh, which gets that other Euler number, then patches it.
 void expect_patched(const openvdb::FloatGrid::Ptr& grid, const Vec3& place, double radius, long without) {
     const LevelSet surface(grid);
-    const auto lattice = surface.lattice_numbers();
-    ASSERT_TRUE(lattice.has_value());
+    const auto euler = surface.lattice_euler();
+    const auto components = surface.lattice_components();
+    ASSERT_TRUE(euler && components);
     Carved carved(surface, 0.5, 0.8);
-    ASSERT_EQ(topology_of(carved.mesh()).euler, lattice->euler);
+    ASSERT_EQ(topology_of(carved.mesh()).euler, *euler);
     for (int c = 0; c < static_cast<int>(carved.labels.size()); ++c)
         if (carved.labels[c] && (carved.centroid(c) - place).norm() < radius) carved.labels[c] = 0;
     FrameMesh mesh = carved.mesh();
     ASSERT_EQ(topology_of(mesh).euler, without);
-    ASSERT_EQ(topology_of(mesh).components, lattice->components.size());
+    ASSERT_EQ(topology_of(mesh).components, components->size());
 
     Inspected now(carved, mesh);
     const std::vector<double> thickness(carved.particles.size(), 0.3);
     EXPECT_EQ(patch_topology(now.trials, thickness, surface), 1u);
     const MeshTopology topology = topology_of(mesh);
-    EXPECT_EQ(topology.euler, lattice->euler);
-    EXPECT_EQ(topology.components, lattice->components.size());
+    EXPECT_EQ(topology.euler, *euler);
+    EXPECT_EQ(topology.components, components->size());
     expect_sound(mesh);
     EXPECT_EQ(mesh.on_surface.size(), mesh.vertices.size());
     EXPECT_EQ(mesh.carved.particle.size(), mesh.vertices.size());

@@ -7,7 +7,10 @@
 #include <cmath>
 #include <functional>
 #include <ostream>
+#include <random>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "isotrack/compare/baselines.h"
 #include "isotrack/meshing/mesh_topology.h"
@@ -43,6 +46,26 @@ double disk(const Vec3& p, double radius, double thickness) {
     const double height = p.dot(normal), beside = (p - height * normal).norm() - radius,
                  above = std::abs(height) - 0.5 * thickness;
     return beside > 0.0 && above > 0.0 ? std::hypot(beside, above) : std::max(beside, above);
+}
+
+/// Blobs and rods about three voxels thick and as far apart, where waves of all directions add up.
+Solid noise(unsigned seed) {
+    constexpr double kPi = 3.14159265358979323846, kWave = 6.0, kWaves = 24;
+    std::mt19937 random(seed);
+    const auto uniform = [&] { return random() / 4294967296.0; };
+    std::vector<std::pair<Vec3, double>> waves;
+    for (int i = 0; i < kWaves; ++i) {
+        const double height = 2.0 * uniform() - 1.0, turn = 2.0 * kPi * uniform(),
+                     beside = std::sqrt(1.0 - height * height);
+        waves.emplace_back(2.0 * kPi / kWave * Vec3(beside * std::cos(turn), beside * std::sin(turn), height),
+                           2.0 * kPi * uniform());
+    }
+    return {"noise_" + std::to_string(seed), [waves](const Vec3& p) {
+                double sum = 0.0;
+                for (const auto& [wave, phase] : waves) sum += std::cos(wave.dot(p) + phase);
+                const double level = sum / std::sqrt(0.5 * kWaves);  // of variance 1
+                return std::max((0.9 - level) * kWave / (2.0 * kPi) * std::sqrt(3.0), ball(p, 13.2));
+            }};
 }
 
 std::vector<Solid> solids() {
@@ -100,6 +123,7 @@ std::vector<Solid> solids() {
              return nearest;
          },
          1, -8});
+    for (const unsigned seed : {1u, 2u, 3u}) result.push_back(noise(seed));
     return result;
 }
 

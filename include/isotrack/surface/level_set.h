@@ -49,7 +49,8 @@ public:
     std::vector<Crossing> crossings(double apart) const override;
     std::vector<Eigen::Vector3i> upright_crossings() const override;
     std::vector<Diagonal> diagonals() const override;
-    std::optional<Numbers> lattice_numbers() const override;  ///< That of volumeToMesh.
+    std::optional<long> lattice_euler() const override;  ///< Those of volumeToMesh, this and the next.
+    std::optional<std::vector<Box>> lattice_components() const override;
     TriangleMesh lattice_mesh(const std::vector<Vec3>& places, double reach) const override;
 
     /// True when there is no surface: no sign change between neighbouring voxels.

@@ -106,12 +106,10 @@ public:
     virtual TriangleMesh lattice_mesh(const std::vector<Vec3>& /*places*/, double /*reach*/) const {
         return {};
     }
-    struct Numbers {
-        std::vector<Box> components;  ///< That hold the vertices of one in a cell each.
-        long euler;
-    };
-    /// Of that mesh, for a part of its price.
-    virtual std::optional<Numbers> lattice_numbers() const { return std::nullopt; }
+    /// Of that mesh, for much less than its price: the Euler number.
+    virtual std::optional<long> lattice_euler() const { return std::nullopt; }
+    /// The components, by boxes that hold the vertices of one in a cell each, for a part of the price.
+    virtual std::optional<std::vector<Box>> lattice_components() const { return std::nullopt; }
 };
 
 }  // namespace isotrack

@@ -1,0 +1,120 @@
+#include "surface/cell_parts.h"
+
+#include <algorithm>
+#include <array>
+
+#include "disjoint_sets.h"
+#include "surface/ambiguous_faces.h"
+
+namespace isotrack {
+namespace {
+
+using openvdb::Coord;
+using Leaf = openvdb::FloatTree::LeafNodeType;
+
+constexpr int kDim = LeafSides::kDim;
+
+/// How many parts the surface has in a cell with the corners of `mask` inside, bit 4 i + 2 j + k. `joined`:
+/// whether the inside corners of an ambiguous face, the one across an axis on a side (0, 1), are.
+template <typename Joined>
+int parts_of(unsigned mask, const Joined& joined) {
+    const auto inside = [&](int corner) { return (mask >> corner & 1u) != 0; };
+    // The edge between two corners, by the one bit in which they differ and the lower of them.
+    const auto edge = [](int a, int b) { return 8 * ((a ^ b) / 2) + std::min(a, b); };
+    DisjointSets edges(8 * 3);
+    int parts = 0;
+    for (const int bit : {1, 2, 4})
+        for (int a = 0; a < 8; ++a)
+            if ((a & bit) == 0) parts += inside(a) != inside(a + bit);
+    for (int axis = 0; axis < 3; ++axis)
+        for (const int side : {0, 1}) {
+            const int out = 4 >> axis, b = axis == 0 ? 2 : 4, c = axis == 2 ? 2 : 1, at = side * out;
+            const int around[] = {at, at + b, at + b + c, at + c};
+            int crossed[4], count = 0;
+            for (int k = 0; k < 4; ++k)
+                if (inside(around[k]) != inside(around[(k + 1) % 4])) crossed[count++] = k;
+            const auto unite = [&](int k, int l) {
+                parts -=
+                    edges.join(edge(around[k], around[(k + 1) % 4]), edge(around[l], around[(l + 1) % 4]));
+            };
+            if (count == 2) unite(crossed[0], crossed[1]);
+            // The surface cuts off the corners that are not joined, each between the edges before and after.
+            if (count == 4)
+                for (int k = 0; k < 4; ++k)
+                    if (inside(around[k]) != joined(axis, side)) unite((k + 3) % 4, k);
+        }
+    return parts;
+}
+
+/// Of cells without an ambiguous face.
+const std::array<char, 256> kParts = [] {
+    std::array<char, 256> result{};
+    for (unsigned mask = 0; mask < 256; ++mask)
+        result[mask] = static_cast<char>(parts_of(mask, [](int, int) { return false; }));
+    return result;
+}();
+
+int parts_at(const Coord& cell, unsigned mask, TreeReader& reader) {
+    if (!kHasAmbiguousFace[mask]) return kParts[mask];
+    return parts_of(mask, [&](int axis, int side) {
+        return joins_face([&](int i, int j, int k) { return reader.getValue(cell.offsetBy(i, j, k)); }, axis,
+                          side);
+    });
+}
+
+/// Of the cells that have their least node in the leaf.
+long parts_in(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
+    long result = 0;
+    for (int x = 0; x < kDim; ++x)
+        for (int y = 0; y < kDim; ++y) {
+            const unsigned a = sides.row[x][y], b = sides.row[x][y + 1], c = sides.row[x + 1][y],
+                           d = sides.row[x + 1][y + 1], any = a | b | c | d, all = a & b & c & d;
+            for (unsigned mixed = (any | any >> 1) & ~(all & all >> 1) & 0xffu; mixed != 0;
+                 mixed &= mixed - 1) {
+                const int z = __builtin_ctz(mixed);
+                result += parts_at(leaf.origin().offsetBy(x, y, z), sides.of_cell(x, y, z), reader);
+            }
+        }
+    return result;
+}
+
+/// Of the cells that have their least node in a tile, and in this leaf the first on the other side.
+long parts_below(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
+    long result = 0;
+    for (int lower = 1; lower < 8; ++lower) {
+        const int below[] = {lower >> 2, lower >> 1 & 1, lower & 1};
+        const Coord home = leaf.origin().offsetBy(-kDim * below[0], -kDim * below[1], -kDim * below[2]);
+        if (reader.probeConstLeaf(home)) continue;
+        // Nearly always all nodes of the leaf there are on the tile's side.
+        const bool tile = reader.getValue(home) < 0.0f;
+        const unsigned bits = below[2] ? 1u : 0x1ffu;
+        bool all_same = true;
+        for (int x = 0; x <= (below[0] ? 0 : kDim); ++x)
+            for (int y = 0; y <= (below[1] ? 0 : kDim); ++y)
+                all_same = all_same && (sides.row[x][y] & bits) == (tile ? bits : 0u);
+        if (all_same) continue;
+        const auto end = [&](int axis) { return below[axis] ? 0 : kDim; };
+        const auto begin = [&](int axis) { return -below[axis]; };
+        for (int x = begin(0); x < end(0); ++x)
+            for (int y = begin(1); y < end(1); ++y)
+                for (int z = begin(2); z < end(2); ++z) {
+                    const Coord cell = leaf.origin().offsetBy(x, y, z);
+                    const auto node = [&](int n) { return cell.offsetBy(n >> 2, n >> 1 & 1, n & 1); };
+                    unsigned mask = 0;
+                    for (int n = 0; n < 8; ++n)
+                        mask |= static_cast<unsigned>(reader.getValue(node(n)) < 0.0f) << n;
+                    const unsigned others = tile ? mask ^ 0xffu : mask;
+                    if (others != 0 && reader.probeConstLeaf(node(__builtin_ctz(others))) == &leaf)
+                        result += parts_at(cell, mask, reader);
+                }
+    }
+    return result;
+}
+
+}  // namespace
+
+long cell_parts(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
+    return parts_in(leaf, sides, reader) + parts_below(leaf, sides, reader);
+}
+
+}  // namespace isotrack
