@@ -3,6 +3,7 @@
 #include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 
 #include "find_in_blocks.h"
@@ -133,6 +134,17 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
     return result;
 }
 
+namespace {
+
+/// Which of the cubes of a leaf holds a node, or is next to one that is just below the leaf.
+std::size_t number_of(const Coord& in_leaf, int cube) {
+    const int across = kDim / cube;
+    const auto at = [&](int axis) { return std::max(in_leaf[axis], 0) / cube; };
+    return static_cast<std::size_t>((at(0) * across + at(1)) * across + at(2));
+}
+
+}  // namespace
+
 std::vector<std::size_t> thin_out(const CrossedEdges& crossed, int cube) {
     constexpr std::size_t kNone = ~std::size_t{0};
     const int across = kDim / cube;
@@ -150,10 +162,7 @@ std::vector<std::size_t> thin_out(const CrossedEdges& crossed, int cube) {
             }
             for (std::size_t e = part.begin; e < part.end; ++e) {
                 const CrossedEdge& edge = crossed.edges[e];
-                int at[3];
-                for (int axis = 0; axis < 3; ++axis)
-                    at[axis] = std::max(edge.from[axis] - part.origin[axis], 0) / cube;
-                Cube& c = cubes[static_cast<std::size_t>((at[0] * across + at[1]) * across + at[2])];
+                Cube& c = cubes[number_of(edge.from - part.origin, cube)];
                 ++c.count[edge.axis];
                 c.some[2 * edge.axis + edge.outward] = e;
             }
@@ -162,6 +171,34 @@ std::vector<std::size_t> thin_out(const CrossedEdges& crossed, int cube) {
                 for (const std::size_t e : {c.some[2 * axis], c.some[2 * axis + 1]})
                     if (e != kNone) found.push_back(e);
             }
+        }
+    };
+    return find_in_blocks<std::size_t>(crossed.parts.size(), kLeavesPerBlock, find);
+}
+
+std::vector<std::size_t> edges_near(const CrossedEdges& crossed, const std::vector<Vec3>& places,
+                                    double reach, int cube) {
+    const int across = kDim / cube;
+    std::map<Coord, std::vector<char>> wanted;  // of each leaf, by its origin, its cubes
+    for (const Vec3& place : places) {
+        const Eigen::Array3i low = ((place.array() - reach) / cube).floor().cast<int>(),
+                             high = ((place.array() + reach) / cube).floor().cast<int>();
+        for (int x = low.x(); x <= high.x(); ++x)
+            for (int y = low.y(); y <= high.y(); ++y)
+                for (int z = low.z(); z <= high.z(); ++z) {
+                    const Coord node(x * cube, y * cube, z * cube), origin = node & ~(kDim - 1);
+                    auto& cubes = wanted[origin];
+                    cubes.resize(static_cast<std::size_t>(across * across * across), 0);
+                    cubes[number_of(node - origin, cube)] = 1;
+                }
+    }
+    const auto find = [&](std::size_t begin, std::size_t end, std::vector<std::size_t>& found) {
+        for (std::size_t n = begin; n < end; ++n) {
+            const CrossedEdges::Part& part = crossed.parts[n];
+            const auto cubes = wanted.find(part.origin);
+            if (cubes == wanted.end()) continue;
+            for (std::size_t e = part.begin; e < part.end; ++e)
+                if (cubes->second[number_of(crossed.edges[e].from - part.origin, cube)]) found.push_back(e);
         }
     };
     return find_in_blocks<std::size_t>(crossed.parts.size(), kLeavesPerBlock, find);

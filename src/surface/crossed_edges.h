@@ -48,4 +48,8 @@ CrossedEdges find_crossed_edges(const openvdb::FloatTree& tree);
 /// its edges follow, one that goes out and one that goes in. `cube`: 1, 2, 4 or 8.
 std::vector<std::size_t> thin_out(const CrossedEdges& crossed, int cube);
 
+/// Indices of all in those of the cubes that boxes around some places meet, `reach` to each side. In voxels.
+std::vector<std::size_t> edges_near(const CrossedEdges& crossed, const std::vector<Vec3>& places,
+                                    double reach, int cube);
+
 }  // namespace isotrack

@@ -529,22 +529,50 @@ bool LevelSet::at_border(const Vec3& p) const {
         if (!impl_->is_active(low.offsetBy(corner & 1, corner >> 1 & 1, corner >> 2))) return true;
     return false;
 }
-std::vector<Surface::Crossing> LevelSet::crossings(double apart) const {
-    const std::vector<CrossedEdge>& edges = impl_->crossed.edges;
+namespace {
+
+/// The edge in voxels of the largest cube of a leaf that is no longer than `length`; at least 1.
+int cube_within(double length, double voxel) {
     int cube = 1;
-    while (cube < kLeafDim && 2 * cube * resolution() <= apart) cube *= 2;
-    std::vector<std::size_t> some;
-    if (cube > 1) some = thin_out(impl_->crossed, cube);
-    std::vector<Crossing> result(cube > 1 ? some.size() : edges.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.size(), 4096), [&](const auto& range) {
+    while (cube < kLeafDim && 2 * cube * voxel <= length) cube *= 2;
+    return cube;
+}
+
+/// `edge_at(i)` as a crossing, for each i below `count`.
+template <typename EdgeAt>
+std::vector<Surface::Crossing> to_crossings(std::size_t count, const EdgeAt& edge_at, const AffineMap& map) {
+    std::vector<Surface::Crossing> result(count);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 4096), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            const CrossedEdge& edge = edges[cube > 1 ? some[i] : i];
-            const Vec3 along = impl_->map.linear.col(edge.axis).normalized();
-            result[i] = {impl_->map.to_world(edge.index()),
-                         (edge.outward ? 1.0f : -1.0f) * along.cast<float>()};
+            const CrossedEdge& edge = edge_at(i);
+            const Vec3 along = map.linear.col(edge.axis).normalized();
+            result[i] = {map.to_world(edge.index()), (edge.outward ? 1.0f : -1.0f) * along.cast<float>()};
         }
     });
     return result;
+}
+std::vector<Surface::Crossing> to_crossings(const std::vector<std::size_t>& some,
+                                            const std::vector<CrossedEdge>& edges, const AffineMap& map) {
+    return to_crossings(
+        some.size(), [&](std::size_t i) -> const CrossedEdge& { return edges[some[i]]; }, map);
+}
+
+}  // namespace
+
+std::vector<Surface::Crossing> LevelSet::crossings(double apart) const {
+    const std::vector<CrossedEdge>& edges = impl_->crossed.edges;
+    if (const int cube = cube_within(apart, resolution()); cube > 1)
+        return to_crossings(thin_out(impl_->crossed, cube), edges, impl_->map);
+    return to_crossings(
+        edges.size(), [&](std::size_t i) -> const CrossedEdge& { return edges[i]; }, impl_->map);
+}
+std::vector<Surface::Crossing> LevelSet::crossings_near(const std::vector<Vec3>& places, double reach) const {
+    std::vector<Vec3> middles;
+    for (const Vec3& place : places) middles.push_back(impl_->map.to_index(place));
+    // Along any of the lattice's axes.
+    const double voxels = lattice().inverse().linear().cwiseAbs().rowwise().sum().maxCoeff() * reach;
+    const auto near = edges_near(impl_->crossed, middles, voxels, cube_within(reach, resolution()));
+    return to_crossings(near, impl_->crossed.edges, impl_->map);
 }
 namespace {
 

@@ -68,7 +68,10 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
         looked_at_[c] = 1;
         doubtful.push_back(c);
     }
-    return cells_.around(doubtful);
+    if (!crossings_.thinned_out(surface_)) return cells_.around(doubtful);
+    std::vector<Vec3> places;
+    for (const int c : doubtful) places.push_back(crossings_[c].point);
+    return surface_.crossings_near(places, 0.5 * crossings_.spacing());
 }
 
 }  // namespace isotrack

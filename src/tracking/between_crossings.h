@@ -11,20 +11,24 @@ namespace isotrack {
 
 class BetweenCrossings {
 public:
-    /// `crossings`: all of `lattice`, none that stands for others. They must outlive it. `diagonals`: all of
-    /// the surface.
-    BetweenCrossings(const CrossingGrid& crossings, const Eigen::Affine3d& lattice,
+    /// `surface` and `crossings`, some or all of its own, must outlive it. `diagonals`: all of the surface.
+    BetweenCrossings(const Surface& surface, const CrossingGrid& crossings,
                      const std::vector<Surface::Diagonal>& diagonals, double tolerance)
-        : crossings_(crossings), tolerance_(tolerance), cells_(crossings, lattice, diagonals) {}
+        : surface_(surface),
+          crossings_(crossings),
+          tolerance_(tolerance),
+          cells_(crossings, surface.lattice(), diagonals) {}
 
-    /// Points of the surface in the cells beside crossings that the mesh only just reaches, along its folds
-    /// beside nearly all, since from a fold what lies between two crossings may be much farther than either,
-    /// and in all cells with an ambiguous face. What was returned before is left out.
+    /// Points of the surface beside crossings that the mesh only just reaches, along its folds beside nearly
+    /// all, since from a fold what lies between two crossings may be much farther than either. Where some
+    /// crossings stand for others: those others. Else points in cells, of those with an ambiguous face in
+    /// all. What was returned before is left out.
     std::vector<Surface::Crossing> points(const std::vector<Vec3>& vertices,
                                           const std::vector<Triangle>& triangles,
                                           const MeshDistances& at_crossings);
 
 private:
+    const Surface& surface_;
     const CrossingGrid& crossings_;
     const double tolerance_;
     CellPoints cells_;

@@ -13,6 +13,11 @@ struct FrameMesh {
     std::vector<Vec3> on_surface;  ///< The same vertices before the fit.
 };
 
+/// The Euler number of a closed mesh: three halves of an edge for each triangle.
+inline long euler_of(const FrameMesh& mesh) {
+    return static_cast<long>(mesh.vertices.size()) - static_cast<long>(mesh.carved.triangles.size() / 2);
+}
+
 /// The mesh less the flagged triangles and the vertices that none has then.
 FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out);
 

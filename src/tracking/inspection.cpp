@@ -220,13 +220,13 @@ void Inspector::measure_between(const std::vector<Surface::Crossing>& points, co
 }
 
 void Inspector::look_between(const FrameMesh& mesh, Inspection& inspection) {
-    // Where some crossings stand for others the cells do not have all of theirs.
-    if (crossings_.spacing() >= 2.0 * surface_.resolution()) return;
-    prepare_topology();
+    if (!thins_out()) prepare_topology();
     if (!between_crossings_)
-        between_crossings_.emplace(crossings_, surface_.lattice(), sides_->diagonals(), limits_.tolerance);
+        between_crossings_.emplace(surface_, crossings_,
+                                   thins_out() ? std::vector<Surface::Diagonal>{} : sides_->diagonals(),
+                                   limits_.tolerance);
     auto points = between_crossings_->points(mesh.vertices, mesh.carved.triangles, distances_.front());
-    set_unreachable_aside(points);
+    if (!thins_out()) set_unreachable_aside(points);
     measure_between(points, mesh, inspection);
 }
 

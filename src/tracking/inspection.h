@@ -23,7 +23,7 @@ namespace isotrack {
 struct Inspection {
     std::shared_ptr<const std::vector<TriangleError>> errors;  ///< Per triangle; the inspector has them, too.
     /// Farther from the mesh than the tolerance: crossings, and points of the surface between such as are
-    /// nearly so far off, at folds of the mesh, or in cells with an ambiguous face.
+    /// nearly so far off, at folds of the mesh, or in cells with an ambiguous face; see BetweenCrossings.
     std::vector<Surface::Crossing> missed;
     double farthest_crossing = 0.0;      ///< Of these and those, as far as they were found.
     double crossings_mean_square = 0.0;  ///< Of the crossings that were found.
@@ -67,6 +67,8 @@ public:
                                                 const std::vector<Triangle>& triangles) const;
     /// The points between crossings found so far.
     const std::deque<CrossingGrid>& between() const { return between_; }
+    /// Whether some crossings stand for all: the tolerance is several resolutions.
+    bool thins_out() const { return crossings_.thinned_out(surface_); }
     /// What looking at the topology needs of the surface alone; done then if not before.
     void prepare_topology();
     /// The topology of the mesh just inspected.

@@ -132,11 +132,6 @@ std::vector<Vec3> doubtful(const std::vector<Vec3>& places, const FrameMesh& mes
     return result;
 }
 
-/// Of a closed mesh: three halves of an edge for each triangle.
-long euler_of(const FrameMesh& mesh) {
-    return static_cast<long>(mesh.vertices.size()) - static_cast<long>(mesh.carved.triangles.size() / 2);
-}
-
 bool is_sound(const MeshTopology& topology) {
     return topology.closed() && topology.oriented() && topology.manifold();
 }

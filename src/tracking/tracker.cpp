@@ -60,7 +60,8 @@ constexpr double kMostSeeded = 0.05;   // of the particles; with more the next f
 constexpr double kDetail = 2.0;        // tolerances
 constexpr double kDetailOfEdges = 0.25;
 constexpr double kLeastEdge = 0.5, kLargestEdge = 40.0;  // details
-constexpr double kCrossingsApart = 0.5;  // details: what lies between crossings is found from the triangles
+constexpr double kCrossingsApart = 0.5;  // details: those between are looked at where they may be missed
+constexpr double kThick = 3.0;           // tolerances: of a solid without thin parts
 constexpr double kBandShare = 0.8;       // of the reach: interpolated values are right up to there
 constexpr int kCertifyRounds = 24;
 constexpr int kMostTrials = 2;        // rounds of other labels: each takes some meshes
@@ -393,7 +394,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         tetrahedralise(true, seconds, [&] {
             if (!options.fit && options.method != Method::Paper)
                 inspector->expect(particles.position, last_mesh.triangles);
-            inspector->prepare_topology();
+            if (!inspector->thins_out()) inspector->prepare_topology();
         });
         fitted = {};
         make_mesh();
@@ -434,6 +435,14 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         remove_specks(mesh, inspection, *inspector, l);
         if (guided && !options.min_edge) put_in_drops(lost, mesh, inspection, *inspector, surface);
     };
+    // At a coarse tolerance there are many more lattice nodes than particles, and where nothing is thin the
+    // Euler number must do.
+    const auto has_topology = [&] {
+        const std::vector<double>& thickness = last_mesh.evidence.thickness;
+        return guided && inspector->thins_out() && surface.lattice_euler() == euler_of(mesh) &&
+               std::all_of(thickness.begin(), thickness.end(),
+                           [&](double thick) { return thick > kThick * l.tolerance; });
+    };
     // The topology, which takes longer to look at, is looked at when all else passes, and so is once more
     // what lies between crossings.
     int relabellings = 0, trials = 0;
@@ -469,8 +478,11 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         }
         if (good) {
             if (!between) inspector->look_between(mesh, inspection);
-            inspector->inspect_topology(mesh, inspection);
+            if (inspector->thins_out()) last_mesh.take(mesh.carved, particles, dt->cells());
+            const bool known = has_topology();
+            if (!known) inspector->inspect_topology(mesh, inspection);
             if (!passes()) continue;
+            if (known) break;
             mend_components();  // which may find more that is missed
             if (last || ++trials == kMostTrials || inspection.missed.empty() ||
                 mend(mesh, inspection, surface, l, *densifier) == 0)
@@ -479,10 +491,12 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     }
     if (guided && !options.min_edge) {
         const StageTimer timer(seconds, "certify");
-        if (inspection.topology.speck.size() != mesh.carved.triangles.size())
-            inspector->inspect_topology(mesh, inspection);
         MeshTrials of_mesh(mesh, inspection, *inspector, l);
-        patch_topology(of_mesh, last_mesh.evidence.thickness, surface);
+        if (!has_topology()) {
+            if (inspection.topology.speck.size() != mesh.carved.triangles.size())
+                inspector->inspect_topology(mesh, inspection);
+            patch_topology(of_mesh, last_mesh.evidence.thickness, surface);
+        }
         inspector->look_off_surface(mesh, inspection);
         patch_failing(of_mesh, last_mesh.evidence.thickness, surface);
     }

@@ -186,6 +186,31 @@ TEST(LevelSet, FindsTheCrossedEdgesOfARandomGrid) {
     }
 }
 
+TEST(LevelSet, GivesAllCrossingsNearPlaces) {
+    const double h = 0.02;
+    const LevelSet level_set(rasterise(*shapes::torus({0.1, 0, 0}, 0.5, 0.21, h), h));
+    const auto all = level_set.crossings();
+    const auto is_less = [](const Vec3& a, const Vec3& b) {
+        return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+    };
+    for (const double reach : {0.4 * h, 1.0 * h, 3.7 * h}) {
+        const std::vector<Vec3> places = {all[7].point, all[all.size() / 3].point, Vec3(9, 9, 9)};
+        std::set<Vec3, decltype(is_less)> near(is_less);
+        for (const auto& crossing : level_set.crossings_near(places, reach))
+            EXPECT_TRUE(near.insert(crossing.point).second) << "twice";
+        EXPECT_LT(near.size(), all.size() / 20);
+        std::size_t wanted = 0;
+        for (const auto& crossing : all)
+            for (const Vec3& place : places)
+                if ((crossing.point - place).cwiseAbs().maxCoeff() <= reach) {
+                    EXPECT_EQ(near.count(crossing.point), 1u);
+                    ++wanted;
+                }
+        EXPECT_GE(wanted, 2u);
+    }
+    EXPECT_TRUE(level_set.crossings_near({}, h).empty());
+}
+
 TEST(LevelSet, LetsACrossingStandForOthersInACube) {
     const double h = 0.02;
     // A ball, a drop of three voxels between the lines of a coarse lattice, and a plate of two.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "isotrack/compare/baselines.h"
+#include "isotrack/meshing/certify.h"
 #include "isotrack/meshing/mesh_topology.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "isotrack/surface/level_set.h"
@@ -166,6 +168,39 @@ TEST_P(Topology, IsThatOfTheLevelSet) {
             EXPECT_EQ(topology.euler, wanted.euler);
             EXPECT_TRUE(self_intersections(result.mesh).empty());
             EXPECT_TRUE(result.within_tolerance) << result.max_error << ", lost " << result.lost_crossings;
+        }
+    }
+}
+
+/// A cube turned in space, with a ball beside it.
+double turned_cube(const Vec3& p) {
+    const Eigen::Matrix3d turn =
+        (Eigen::AngleAxisd(0.5, Vec3::UnitX()) * Eigen::AngleAxisd(0.7, Vec3::UnitZ()) *
+         Eigen::AngleAxisd(0.3, Vec3::UnitY()))
+            .toRotationMatrix();
+    const Vec3 out = (turn * p).cwiseAbs() - Vec3::Constant(11.4);
+    const double cube = out.cwiseMax(0.0).norm() + std::min(out.maxCoeff(), 0.0);
+    return std::min(cube, ball(p - Vec3(19.1, 14.2, -12.7), 4.3));
+}
+
+TEST(CoarseTolerance, KeepsTheDistanceFromEveryCrossing) {
+    const LevelSet surface = grid_of({"turned_cube", turned_cube});
+    for (const double tolerance : {1.0, 1.5, 2.0}) {
+        SCOPED_TRACE(tolerance);
+        TrackerOptions options;
+        options.tolerance = tolerance;
+        Tracker tracker(options);
+        for (int frame = 0; frame < 2; ++frame) {
+            const TrackedFrame result = tracker.advance(surface);
+            EXPECT_TRUE(result.within_tolerance) << result.max_error;
+            const MeshTopology topology = mesh_topology(result.mesh);
+            EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
+            EXPECT_EQ(topology.components, 2u);
+            EXPECT_EQ(topology.euler, 4);
+            const CrossingGrid all(surface);
+            const auto distances =
+                crossing_distances(result.mesh.points, result.mesh.triangles, all, 2.0 * tolerance);
+            EXPECT_LE(*std::max_element(distances.begin(), distances.end()), tolerance);
         }
     }
 }

@@ -28,6 +28,8 @@ public:
         return {origin_ + e.offset.cast<double>(), directions_[e.direction]};
     }
     double spacing() const { return spacing_; }
+    /// Whether some of a surface's crossings stand for all.
+    bool thinned_out(const Surface& surface) const { return spacing_ >= 2.0 * surface.resolution(); }
 
     /// Calls `visit` with the index of every crossing in `box`; of those in columns that are set only, if
     /// given.

@@ -87,6 +87,12 @@ public:
     /// Of those within a cube of an edge up to `apart` some along one axis may stand for all: one that goes
     /// out and one that goes in, where there are both. This default scans `bounds()` and gives all.
     virtual std::vector<Crossing> crossings(double apart) const;
+    /// All of them in boxes around some places, `reach` to each side, and others nearby. This default, which
+    /// lets none stand for others, has none.
+    virtual std::vector<Crossing> crossings_near(const std::vector<Vec3>& /*places*/,
+                                                 double /*reach*/) const {
+        return {};
+    }
     /// The lower ends of the crossed edges along the lattice's third axis, in any order.
     virtual std::vector<Eigen::Vector3i> upright_crossings() const;
 
