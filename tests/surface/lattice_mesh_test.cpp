@@ -97,6 +97,25 @@ void expect_within_cells(const LevelSet& level_set) {
     }
 }
 
+TEST(LatticeMesh, HasTheEulerNumberThatItsCellsSay) {
+    // Single voxels in leaves far apart, next to one another, and with corners alone in common.
+    for (const unsigned seed : {1u, 2u, 3u, 4u, 5u, 6u}) {
+        std::mt19937 random(seed);
+        const auto coordinate = [&] { return static_cast<int>(random() % 40) - 20; };
+        auto grid = openvdb::FloatGrid::create(1.0f);
+        grid->setGridClass(openvdb::GRID_LEVEL_SET);
+        auto values = grid->getAccessor();
+        const int count = seed % 2 == 0 ? 300 : 6000;
+        for (int i = 0; i < count; ++i) {
+            const openvdb::Coord node(coordinate(), coordinate(), coordinate());
+            const float size = 0.02f + 0.9f * static_cast<float>(random() % 1000) / 1000.0f;
+            values.setValue(node, random() % 3 > 0 ? -size : size);
+        }
+        const LevelSet scattered(grid);
+        EXPECT_EQ(scattered.lattice_euler(), mesh_topology(volume_to_mesh(scattered)).euler) << seed;
+    }
+}
+
 TEST(LatticeMesh, OfABallIsOnIt) {
     const Vec3 centre(0.3, -0.2, 0.1);
     const LevelSet ball = cube_of([&](int x, int y, int z) { return (Vec3(x, y, z) - centre).norm() - 7.3; });
