@@ -220,11 +220,11 @@ void Inspector::measure_between(const std::vector<Surface::Crossing>& points, co
 }
 
 void Inspector::look_between(const FrameMesh& mesh, Inspection& inspection) {
-    if (!thins_out()) prepare_topology();
-    if (!between_crossings_)
-        between_crossings_.emplace(surface_, crossings_,
-                                   thins_out() ? std::vector<Surface::Diagonal>{} : sides_->diagonals(),
-                                   limits_.tolerance);
+    if (!between_crossings_) {
+        std::vector<Surface::Diagonal> diagonals;
+        if (!thins_out()) diagonals = sides_ ? sides_->diagonals() : surface_.diagonals();
+        between_crossings_.emplace(surface_, crossings_, diagonals, limits_.tolerance);
+    }
     auto points = between_crossings_->points(mesh.vertices, mesh.carved.triangles, distances_.front());
     if (!thins_out()) set_unreachable_aside(points);
     measure_between(points, mesh, inspection);

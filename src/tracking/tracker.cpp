@@ -61,8 +61,8 @@ constexpr double kDetail = 2.0;        // tolerances
 constexpr double kDetailOfEdges = 0.25;
 constexpr double kLeastEdge = 0.5, kLargestEdge = 40.0;  // details
 constexpr double kCrossingsApart = 0.5;  // details: those between are looked at where they may be missed
-constexpr double kThick = 3.0;           // tolerances: of a solid without thin parts
-constexpr double kBandShare = 0.8;       // of the reach: interpolated values are right up to there
+constexpr double kThick = 3.0, kThickNodes = 6.0;  // tolerances, resolutions: of a solid without thin parts
+constexpr double kBandShare = 0.8;                 // of the reach: interpolated values are right up to there
 constexpr int kCertifyRounds = 24;
 constexpr int kMostTrials = 2;        // rounds of other labels: each takes some meshes
 constexpr int kMostRelabellings = 4;  // what changes sides might go on changing them
@@ -384,6 +384,12 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         const StageTimer timer(seconds, "fit");
         fitted.fit_vertices(mesh, particles.size(), surface);
     };
+    // Where nothing is thin the nodes of the lattice need not be looked at: the Euler number tells.
+    const auto is_thick = [&] {
+        const double least = std::max(kThick * l.tolerance, kThickNodes * surface.resolution());
+        const std::vector<double>& thickness = last_mesh.evidence.thickness;
+        return std::all_of(thickness.begin(), thickness.end(), [&](double thick) { return thick > least; });
+    };
     const std::size_t crossing_count = work->crossings->size();
     // Once, when many particles have to be added, their surroundings make room for them.
     std::size_t added = 0;
@@ -394,7 +400,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         tetrahedralise(true, seconds, [&] {
             if (!options.fit && options.method != Method::Paper)
                 inspector->expect(particles.position, last_mesh.triangles);
-            if (!inspector->thins_out()) inspector->prepare_topology();
+            if (!is_thick()) inspector->prepare_topology();
         });
         fitted = {};
         make_mesh();
@@ -428,20 +434,15 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
                 return other;
             };
             MeshTrials trials(mesh, inspection, *inspector, l);
-            join_specks(trials, labels, carve_labels, dt->cells(), particles, surface, l);
+            if (join_specks(trials, labels, carve_labels, dt->cells(), particles, surface, l) > 0)
+                last_mesh.take(mesh.carved, particles, dt->cells());
         }
-        last_mesh.take(mesh.carved, particles, dt->cells());
         const std::vector<std::vector<Vec3>> lost = inspection.topology.lost;
         remove_specks(mesh, inspection, *inspector, l);
         if (guided && !options.min_edge) put_in_drops(lost, mesh, inspection, *inspector, surface);
     };
-    // At a coarse tolerance there are many more lattice nodes than particles, and where nothing is thin the
-    // Euler number must do.
     const auto has_topology = [&] {
-        const std::vector<double>& thickness = last_mesh.evidence.thickness;
-        return guided && inspector->thins_out() && surface.lattice_euler() == euler_of(mesh) &&
-               std::all_of(thickness.begin(), thickness.end(),
-                           [&](double thick) { return thick > kThick * l.tolerance; });
+        return guided && is_thick() && surface.lattice_euler() == euler_of(mesh);
     };
     // The topology, which takes longer to look at, is looked at when all else passes, and so is once more
     // what lies between crossings.
@@ -478,7 +479,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         }
         if (good) {
             if (!between) inspector->look_between(mesh, inspection);
-            if (inspector->thins_out()) last_mesh.take(mesh.carved, particles, dt->cells());
+            last_mesh.take(mesh.carved, particles, dt->cells());
             const bool known = has_topology();
             if (!known) inspector->inspect_topology(mesh, inspection);
             if (!passes()) continue;
