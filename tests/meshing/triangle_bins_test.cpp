@@ -37,12 +37,7 @@ TEST_P(InTriangleBins, ThoseThatMeetABoxAreFound) {
     for (int round = 0; round < 200; ++round) {
         const Vec3 low = place();
         const Box box(low, low + Vec3(size(random), size(random), size(random)));
-        std::vector<int> expected;
-        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-            Box own;
-            for (const int v : mesh.triangles[t]) own.extend(mesh.points[v]);
-            if (own.intersects(box)) expected.push_back(static_cast<int>(t));
-        }
+        const std::vector<int> expected = support::triangles_meeting(box, mesh);
         EXPECT_EQ(bins.meeting(box), expected);
         found += expected.size();
     }

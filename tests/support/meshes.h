@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <utility>
+#include <vector>
 
 #include "isotrack/types.h"
 
@@ -82,6 +83,17 @@ inline TriangleMesh icosphere(int rounds, const Vec3& centre = Vec3::Zero(), dou
     }
     for (Vec3& p : mesh.points) p = centre + radius * p;
     return mesh;
+}
+
+/// Those whose boxes meet this one, by asking each.
+inline std::vector<int> triangles_meeting(const Box& box, const TriangleMesh& mesh) {
+    std::vector<int> result;
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        Box own;
+        for (const int v : mesh.triangles[t]) own.extend(mesh.points[v]);
+        if (own.intersects(box)) result.push_back(static_cast<int>(t));
+    }
+    return result;
 }
 
 }  // namespace isotrack::support
