@@ -40,6 +40,7 @@ Json to_object(const FrameReport& row) {
             {"relocated", row.relocated},
             {"max_error_vx", number(row.max_error_vx)},
             {"rms_error_vx", number(row.rms_error_vx)},
+            {"most_turned_deg", number(row.most_turned_deg)},
             {"min_angle_deg", number(row.min_angle_deg)},
             {"closed", row.closed},
             {"manifold", row.manifold},

@@ -11,8 +11,7 @@
 namespace isotrack {
 namespace {
 
-constexpr double kFacing = 0.5;  // cosine to the surface normal, at least
-constexpr double kOwn = 1.03;    // of the tolerance: what is that near is of a triangle
+constexpr double kOwn = 1.03;  // of the tolerance: what is that near is of a triangle
 
 Box box_of(const std::vector<Vec3>& points, const Triangle& t) {
     Box box(points[t[0]]);
@@ -60,14 +59,8 @@ double BluntedMesh::sharpness_of(const Triangle& t) const {
 
 double BluntedMesh::facing(const std::vector<Triangle>& some) const {
     double least = 1.0;
-    for (const Triangle& t : some) {
-        const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-        const Vec3 n = (b - a).cross(c - a).normalized();
-        double most = n.dot(probe.normal((a + b + c) / 3.0));
-        for (const int v : t)
-            if (most < kFacing) most = std::max(most, n.dot(probe.normal(points[v])));
-        least = std::min(least, most);
-    }
+    for (const Triangle& t : some)
+        least = std::min(least, isotrack::facing(points[t[0]], points[t[1]], points[t[2]], probe));
     return least;
 }
 
@@ -131,11 +124,12 @@ bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>
 
 bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replaced& before) {
     if (!(facing(candidates) > std::min(kFacing, before.facing))) return false;
-    const auto is_near = [&](const Triangle& t) {
+    const auto passes = [&](const Triangle& t) {
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-        return certified_error(a, b, c, probe, resolution, 0.5 * tolerance).largest <= tolerance;
+        const TriangleError error = certified_error(a, b, c, probe, resolution, 0.5 * tolerance);
+        return error.largest <= tolerance && error.turned_deg <= kMostTurned;
     };
-    return std::all_of(candidates.begin(), candidates.end(), is_near) && reach_what(before, candidates);
+    return std::all_of(candidates.begin(), candidates.end(), passes) && reach_what(before, candidates);
 }
 
 std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& except) {

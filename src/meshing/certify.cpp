@@ -18,7 +18,7 @@ namespace {
 
 /// A triangle stands for a crossing when it faces the way the crossing leaves the inside, or nearly: the
 /// surface itself always does.
-constexpr double kFacing = -0.2;
+constexpr double kStandsFor = -0.2;
 
 constexpr int kFewestSteps = 3, kMostSteps = 6;
 constexpr double kSteep = 0.3;  // of the steepest a distance can be
@@ -92,6 +92,27 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
     return survey(a, b, c, probe, steps, refine_above).error;
 }
 
+double facing(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
+    const Vec3 normal = (b - a).cross(c - a).normalized();
+    double most = normal.dot(probe.normal((a + b + c) / 3.0));
+    for (const Vec3* corner : {&a, &b, &c})
+        if (most < kFacing) most = std::max(most, normal.dot(probe.normal(*corner)));
+    return most;
+}
+
+double normal_deviation(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
+                        double resolution) {
+    constexpr double kLeastHeight = 0.5;  // resolutions
+    constexpr double kLeastSlope = 0.6;
+    constexpr double kDegrees = 57.29577951308232;
+    const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+    const double least_area = kLeastHeight * resolution * std::sqrt(longest2);
+    if (!((b - a).cross(c - a).norm() > least_area) ||
+        !(probe.sample((a + b + c) / 3.0).gradient.norm() > kLeastSlope))
+        return 0.0;
+    return kDegrees * std::acos(std::clamp(facing(a, b, c, probe), -1.0, 1.0));
+}
+
 int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution) {
     const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
     const double wanted = std::ceil(std::sqrt(longest2) / resolution);
@@ -101,10 +122,13 @@ int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution) 
 TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
                               double resolution, double refine_above) {
     const int steps = error_steps(a, b, c, resolution);
-    const auto [error, steepest] = survey(a, b, c, probe, steps, refine_above);
-    if (steps == kMostSteps || !(error.largest > kAlmost * refine_above || steepest > kSteep)) return error;
-    const TriangleError again = triangle_error(a, b, c, probe, kMostSteps, refine_above);
-    return again.largest > error.largest ? again : error;
+    auto [error, steepest] = survey(a, b, c, probe, steps, refine_above);
+    if (steps < kMostSteps && (error.largest > kAlmost * refine_above || steepest > kSteep)) {
+        const TriangleError again = triangle_error(a, b, c, probe, kMostSteps, refine_above);
+        if (again.largest > error.largest) error = again;
+    }
+    error.turned_deg = normal_deviation(a, b, c, probe, resolution);
+    return error;
 }
 
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
@@ -188,7 +212,7 @@ private:
 double FacingTriangle::squared_distance(const Surface::Crossing& crossing, double limit) const {
     constexpr double kInfinite = std::numeric_limits<double>::infinity();
     const double off_plane = normal_.dot(crossing.point - a_);
-    if (off_plane * off_plane > limit || normal_.dot(crossing.outward.cast<double>()) < kFacing)
+    if (off_plane * off_plane > limit || normal_.dot(crossing.outward.cast<double>()) < kStandsFor)
         return kInfinite;
     return isotrack::squared_distance(crossing.point, a_, b_, c_);
 }

@@ -22,7 +22,6 @@ constexpr double kDamping = 0.001;
 constexpr int kLattice = 3;      // of the samples in a triangle
 constexpr double kGain = 0.9;    // of the error, at most, for a flip to be worth it
 constexpr double kWorth = 0.25;  // of the mean error of two triangles: less is not looked at
-constexpr double kFacing = 0.5;  // cosine to the surface normal, at least
 
 struct Flip {
     double gain = 0.0;
@@ -99,8 +98,7 @@ private:
         return sharpness(points_[t[0]], points_[t[1]], points_[t[2]]);
     }
     double facing(const Triangle& t, Surface::Probe& probe) const {
-        const Vec3 &a = points_[t[0]], &b = points_[t[1]], &c = points_[t[2]];
-        return (b - a).cross(c - a).normalized().dot(probe.normal((a + b + c) / 3.0));
+        return isotrack::facing(points_[t[0]], points_[t[1]], points_[t[2]], probe);
     }
     bool is_edge(int v, int w, const Corners& corners) const {
         const auto has = [&](const std::vector<Triangle>& triangles, const Corners& of) {

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 #include "component_boxes.h"
 #include "find_in_blocks.h"
@@ -224,10 +225,13 @@ private:
     NodeValues nodes_;
 };
 
-/// Median length of the world gradient at the surface, away from the border; 0 when there is nothing to
-/// measure.
-double slope_at_surface(const FloatTree& tree, const AffineMap& map,
-                        const std::vector<CrossedEdge>& crossings) {
+/// Length of the world gradient at the surface, away from the border; 0 when there is nothing to measure.
+struct Slope {
+    double median = 0.0, mean = 0.0;
+};
+
+Slope slope_at_surface(const FloatTree& tree, const AffineMap& map,
+                       const std::vector<CrossedEdge>& crossings) {
     constexpr std::size_t kSamples = 4000;
     Stencil stencil(tree);
     std::vector<double> slopes;
@@ -238,10 +242,11 @@ double slope_at_surface(const FloatTree& tree, const AffineMap& map,
             const double slope = map.gradient_to_world(stencil.sample(crossings[i].index()).gradient).norm();
             if (std::isfinite(slope) && slope > 0.0) slopes.push_back(slope);
         }
-    if (slopes.empty()) return 0.0;
+    if (slopes.empty()) return {};
+    const double sum = std::accumulate(slopes.begin(), slopes.end(), 0.0);
     const auto middle = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2);
     std::nth_element(slopes.begin(), middle, slopes.end());
-    return *middle;
+    return {*middle, sum / static_cast<double>(slopes.size())};
 }
 
 /// World units per grid unit for a measured slope: exact where the unit is recognised.
@@ -317,7 +322,7 @@ struct LevelSet::Impl {
     AffineMap map;
     FloatGrid::ConstPtr grid;
     double scale = 1.0;
-    double reach = 0.0;
+    double reach = 0.0, slope = 1.0;
     std::size_t active_voxels = 0, border_crossings = 0;
     openvdb::GridBase::ConstPtr source;  // as it came
     CrossedEdges crossed;
@@ -357,8 +362,9 @@ struct LevelSet::Impl {
                 grid_label(*source) + " is not a level set: its values do not change sign around " +
                 std::to_string(options.iso) + " (class '" + openvdb::GridBase::gridClassToString(grid_class) +
                 "'); give an iso value inside its range");
-        scale = value_scale_for(slope_at_surface(grid->constTree(), map, found.edges), map.voxel_size,
-                                grid_class == openvdb::GRID_LEVEL_SET);
+        const Slope in_grid_units = slope_at_surface(grid->constTree(), map, found.edges);
+        scale = value_scale_for(in_grid_units.median, map.voxel_size, grid_class == openvdb::GRID_LEVEL_SET);
+        if (in_grid_units.mean > 0.0) slope = std::min(1.0, scale * in_grid_units.mean);
         border_crossings = static_cast<std::size_t>(
             std::count_if(found.edges.begin(), found.edges.end(), [](const auto& c) { return c.at_border; }));
 
@@ -510,6 +516,9 @@ double LevelSet::resolution() const {
 }
 double LevelSet::reach() const {
     return impl_->reach;
+}
+double LevelSet::slope() const {
+    return impl_->slope;
 }
 Box LevelSet::bounds() const {
     return impl_->bounds;

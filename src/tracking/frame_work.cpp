@@ -88,7 +88,7 @@ void FrameWork::blunt() {
 TrackedFrame FrameWork::finish(const TrackerOptions& options) {
     if (options.method != Method::Paper) blunt();
     if (options.method != Method::Paper && options.fit) refit();
-    report(mesh, inspection, limits, frame);
+    report(mesh, inspection, surface, frame);
     frame.mesh.points = std::move(mesh.vertices);
     frame.mesh.triangles = std::move(mesh.carved.triangles);
     return std::move(frame);

@@ -139,7 +139,7 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, facets.size(), 1024), [&](const auto& range) {
         for (std::size_t f = range.begin(); f < range.end(); ++f) {
             (*measured)[f] = *known[f];
-            too_far[f] = known[f]->largest > kCertified * limits_.tolerance;
+            too_far[f] = is_too_far(*known[f], limits_.tolerance);
         }
     });
     std::vector<Vec3> in_vain;
@@ -305,15 +305,13 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     std::vector<Shortage> result;
     const auto probe = surface.probe();
     const CarvedSurface& carved = mesh.carved;
-    const auto is_too_far = [&](std::size_t t) {
-        return (*inspection.errors)[t].largest > kCertified * limits.tolerance;
-    };
     std::vector<char> fails(inspection.errors->size());
     std::vector<std::optional<Shortage>> at_crease(fails.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, fails.size(), 1024), [&](const auto& range) {
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
             const auto [corner, whole] = corners_of(carved, t);
-            fails[t] = is_too_far(t) ||
+            const TriangleError& error = (*inspection.errors)[t];
+            fails[t] = is_too_far(error, limits.tolerance) || is_turned(error) ||
                        (whole && is_needle_even_fitted(mesh, particles, t, corner, surface.resolution()));
             if (!fails[t] && whole)
                 at_crease[t] = crease_shortage(mesh, particles, t, corner, surface.resolution());
@@ -322,14 +320,13 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     for (std::size_t t = 0; t < fails.size(); ++t) {
         if (at_crease[t]) result.push_back(*at_crease[t]);
         if (!fails[t]) continue;
-        const bool too_far = is_too_far(t);
         const auto [corner, whole] = corners_of(carved, t);
         const auto x = whole ? dual_crossing(cells, particles.position, carved.inside_cell[t],
                                              carved.inside_facet[t], *probe)
                              : std::nullopt;
         if (x) {
             result.push_back({*x, (*x - particles.position[corner[0]]).norm()});
-        } else if (too_far) {
+        } else if (is_too_far((*inspection.errors)[t], limits.tolerance)) {
             double h = limits.max_edge;
             for (const int p : corner)
                 if (p >= 0) h = std::min(h, particles.spacing[p]);
@@ -345,8 +342,9 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     return result;
 }
 
-void report(const FrameMesh& mesh, const Inspection& inspection, const SizingLimits& limits,
+void report(const FrameMesh& mesh, const Inspection& inspection, const Surface& surface,
             TrackedFrame& frame) {
+    const double slope = surface.slope();
     double sum = 0.0, weight = 0.0;
     frame.max_error = inspection.farthest_crossing;
     for (std::size_t t = 0; t < inspection.errors->size(); ++t) {
@@ -354,14 +352,16 @@ void report(const FrameMesh& mesh, const Inspection& inspection, const SizingLim
         const auto& [i, j, k] = mesh.carved.triangles[t];
         const double area =
             (mesh.vertices[j] - mesh.vertices[i]).cross(mesh.vertices[k] - mesh.vertices[i]).norm();
-        frame.max_error = std::max(frame.max_error, error.largest);
-        sum += area * error.mean_square;
+        frame.max_error = std::max(frame.max_error, error.largest / slope);
+        frame.most_turned_deg = std::max(frame.most_turned_deg, error.turned_deg);
+        sum += area * error.mean_square / (slope * slope);
         weight += area;
     }
     frame.lost_crossings = inspection.lost_crossings;
     frame.rms_error =
         std::sqrt(std::max(weight > 0.0 ? sum / weight : 0.0, inspection.crossings_mean_square));
-    frame.within_tolerance = frame.max_error <= limits.tolerance && frame.lost_crossings == 0;
+    frame.within_tolerance = frame.max_error <= frame.tolerance && frame.lost_crossings == 0 &&
+                             frame.most_turned_deg < kTurnedOver;
 }
 
 }  // namespace isotrack

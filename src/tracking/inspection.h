@@ -110,16 +110,15 @@ private:
     int looks_ = 0;  // at the topology
 };
 
-/// Where particles are missing: at the dual crossings of triangles with too large an error or, where the
-/// surface is smooth, too small an angle; in the middle of the longest edge of what is sharper than 18
-/// degrees across a crease, if a resolution high or more; at crossings that are missed; around nodes whose
-/// side is wrong; on complex edges.
+/// Where particles are missing: at the dual crossings of triangles with too large an error, turned from the
+/// surface's normals or, where it is smooth, with too small an angle; in the middle of the longest edge of
+/// what is sharper than 18 degrees across a crease, if a resolution high or more; at crossings that are
+/// missed; around nodes whose side is wrong; on complex edges.
 std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspection, const Tetrahedra& cells,
                                 const Particles& particles, const Surface& surface,
                                 const SizingLimits& limits);
 
 /// The errors into the frame's row.
-void report(const FrameMesh& mesh, const Inspection& inspection, const SizingLimits& limits,
-            TrackedFrame& frame);
+void report(const FrameMesh& mesh, const Inspection& inspection, const Surface& surface, TrackedFrame& frame);
 
 }  // namespace isotrack

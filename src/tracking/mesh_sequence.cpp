@@ -138,14 +138,15 @@ void check_outputs(const InputSequence& input, const std::string& output,
 std::map<std::string, std::string> effective_settings(const MeshSequenceOptions& options,
                                                       const LevelSet& level_set) {
     const double voxel_size = level_set.voxel_size();
-    const SizingLimits limits = sizing_limits(tracker_options(options, voxel_size), level_set);
+    const TrackerOptions tracker = tracker_options(options, voxel_size);
+    const SizingLimits limits = sizing_limits(tracker, level_set);
     std::map<std::string, std::string> s;
     const auto length = [&](double world) {
         char text[96];
         std::snprintf(text, sizeof text, "%.6g (%.4gvx)", world, world / voxel_size);
         return std::string(text);
     };
-    s["tolerance"] = length(limits.tolerance);
+    s["tolerance"] = length(effective_tolerance(tracker, level_set));
     s["min_edge"] = length(limits.min_edge);
     s["max_edge"] = length(limits.max_edge);
     s["angle"] = std::to_string(std::lround(options.angle_deg.value_or(default_angle_deg(options.method)))) +
@@ -186,6 +187,7 @@ void describe(const TrackedFrame& tracked, const LevelSet& level_set, FrameRepor
     row.delaunay_strategy = tracked.delaunay_strategy;
     row.max_error_vx = tracked.max_error / voxel;
     row.rms_error_vx = tracked.rms_error / voxel;
+    row.most_turned_deg = tracked.most_turned_deg;
     const std::vector<double> angles = smallest_angles(tracked.mesh);
     row.min_angle_deg = angles.empty() ? 0.0 : *std::min_element(angles.begin(), angles.end());
     row.seconds = tracked.seconds;
@@ -200,6 +202,7 @@ void describe(const TrackedFrame& tracked, const LevelSet& level_set, FrameRepor
         if (tracked.lost_crossings > 0)
             row.message += "; " + std::to_string(tracked.lost_crossings) +
                            " grid edges cross surface that the mesh lost";
+        if (tracked.most_turned_deg >= kTurnedOver) row.message += "; a triangle is turned over";
     }
 }
 

@@ -18,8 +18,10 @@ double largest_error(const Inspection& inspection) {
 std::vector<Vec3> failing_in(const Inspection& inspection, double tolerance) {
     std::vector<Vec3> result;
     for (const TriangleError& error : *inspection.errors)
-        if (error.largest > kCertified * tolerance) result.push_back(error.where);
+        if (is_too_far(error, tolerance)) result.push_back(error.where);
     for (const Surface::Crossing& missed : inspection.missed) result.push_back(missed.point);
+    for (const TriangleError& error : *inspection.errors)
+        if (error.turned_deg >= kTurnedOver) result.push_back(error.where);
     return result;
 }
 

@@ -26,7 +26,7 @@ public:
     bool try_to_mend(FrameMesh other);
     /// Takes a mesh that was there before.
     void put_back(FrameMesh mesh);
-    /// Where a triangle is too far off, and what is missed.
+    /// Where a triangle is too far off, what is missed, and where a triangle is turned over.
     std::vector<Vec3> failing_places() const;
 
 private:

@@ -18,12 +18,12 @@ namespace isotrack {
 namespace {
 
 // All in resolutions.
-constexpr double kSmall = 3.5;  // reach of the pieces of the mesh that are looked at
-constexpr double kThin = 2.0;   // sheets no farther apart
-constexpr double kApart = 1.5;  // places that near are one
+constexpr double kSmall = 3.5;   // reach of the pieces of the mesh that are looked at
+constexpr double kThin = 2.0;    // sheets no farther apart
+constexpr double kApart = 1.5;   // places that near are one
+constexpr double kAround = 2.5;  // the middles of other patches for what fails
 constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
 constexpr double kLatticeReach = 24.0;
-constexpr double kFarthestFailing = 3.5;
 constexpr double kFlat = 1e-3;  // twice the area over the square of the longest edge
 constexpr std::size_t kFewPlaces = 4;
 constexpr std::size_t kMostFailing = 64, kMostPlaces = 300;
@@ -257,12 +257,12 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
 
 std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface) {
     const double resolution = surface.resolution();
-    const std::vector<Vec3> places = apart(trials.failing_places(), kApart * resolution);
-    if (places.empty() || places.size() > kMostFailing) return 0;
-    const auto is_mended = [&](const Vec3& place) {
-        const std::vector<Vec3> failing = trials.failing_places();
-        return std::none_of(failing.begin(), failing.end(),
-                            [&](const Vec3& other) { return (other - place).norm() < kApart * resolution; });
+    std::vector<Vec3> failing = trials.failing_places(), places = apart(failing, kApart * resolution), around;
+    if (places.empty()) return 0;
+    if (places.size() > kMostFailing) places.resize(kMostFailing);
+    const auto fails_near = [&](const Vec3& place, double distance) {
+        return std::any_of(failing.begin(), failing.end(),
+                           [&](const Vec3& other) { return (other - place).norm() < distance * resolution; });
     };
     const MeshTopology topology = topology_of(trials.mesh());
     const auto has_same_numbers = [&](const MeshTopology& other) {
@@ -288,14 +288,23 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
         patcher.forget();
         return good;
     };
-    for (const bool alone : {true, false}) {
+    const auto patch_near = [&](const std::vector<Vec3>& some, double distance, const auto& patch) {
         for (const double reach : kReaches)
-            for (const Vec3& place : places) {
-                if (reach > kFarthestFailing || is_mended(place) || patcher.is_worn_out()) continue;
-                count += alone ? patch_at(place, reach, has_same_numbers) : patch_twice(place, reach);
+            for (const Vec3& place : some) {
+                if (patcher.is_worn_out() || !fails_near(place, distance)) continue;
+                count += patch(place, reach);
+                failing = trials.failing_places();
             }
         patcher.try_again();
-    }
+    };
+    const auto patch_alone = [&](const Vec3& place, double reach) {
+        return patch_at(place, reach, has_same_numbers);
+    };
+    patch_near(places, kApart, patch_alone);
+    for (const Vec3& v : trials.mesh().vertices)
+        if (fails_near(v, kAround)) around.push_back(v);
+    patch_near(around, kAround, patch_alone);
+    patch_near(places, kApart, patch_twice);
     return count;
 }
 

@@ -48,7 +48,7 @@ void refine(Tetrahedralisation& dt, CellLabels& labels, Particles& particles, De
                                             kSuspect * limits.tolerance);
         std::vector<Shortage> shortages;
         for (std::size_t f = 0; f < facets.size(); ++f) {
-            if (!(errors[f].largest > kCertified * limits.tolerance) &&
+            if (!is_too_far(errors[f], limits.tolerance) && !is_turned(errors[f]) &&
                 !is_needle(particles, triangles[f], surface.resolution()))
                 continue;
             const auto x = dual_crossing(cells, particles.position, facets[f][0], facets[f][1], *probe);

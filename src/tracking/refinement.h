@@ -10,7 +10,7 @@
 
 namespace isotrack {
 
-/// Breaks boundary facets that are too far from the surface or needles at their dual crossing
+/// Breaks boundary facets that are too far from the surface, turned from it or needles at their dual crossing
 /// [Boissonnat, Oudot 2005], then those that fail among the facets that come, until none does or nothing more
 /// can be done. Looks only at cells that changed since they were labelled last: in a mesh of which the rest
 /// was inspected the cost goes with what is added. `labels` follow; `dt` is that of the particles, before and

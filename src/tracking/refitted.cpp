@@ -152,13 +152,14 @@ Inspection refit_within(FrameMesh& mesh, const Inspection& before, const std::ve
         std::vector<char> bad(mesh.carved.triangles.size(), 0);
         const std::vector<Surface::Crossing> missed = refitted.newly_missed(inspection, inspector);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bad.size(), 1024), [&](const auto& range) {
-            for (std::size_t t = range.begin(); t < range.end(); ++t)
-                bad[t] =
-                    refitted.is_changed(t) &&
-                    ((*inspection.errors)[t].largest > std::max(tolerance, (*before.errors)[t].largest) ||
-                     refitted.is_spoilt(t) || std::any_of(missed.begin(), missed.end(), [&](const auto& c) {
-                         return refitted.is_near(t, c.point);
-                     }));
+            for (std::size_t t = range.begin(); t < range.end(); ++t) {
+                const TriangleError &now = (*inspection.errors)[t], &then = (*before.errors)[t];
+                bad[t] = refitted.is_changed(t) &&
+                         (now.largest > std::max(tolerance, then.largest) ||
+                          now.turned_deg > std::max(kMostTurned, then.turned_deg) || refitted.is_spoilt(t) ||
+                          std::any_of(missed.begin(), missed.end(),
+                                      [&](const auto& c) { return refitted.is_near(t, c.point); }));
+            }
         });
         for (const auto& [t, u] : self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}))
             if (refitted.is_changed(t) || refitted.is_changed(u)) bad[t] = bad[u] = 1;  // not there before

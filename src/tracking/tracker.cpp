@@ -23,6 +23,7 @@
 #include "sampling/compact.h"
 #include "surface/float_precision.h"
 #include "tracking/carry.h"
+#include "tracking/failing.h"
 #include "tracking/fitted.h"
 #include "tracking/frame_work.h"
 #include "tracking/inspection.h"
@@ -77,14 +78,10 @@ void round_to_float(Particles& particles) {
     for (Vec3& p : particles.position) p = to_float_precision(p);
 }
 
-double tolerance_of(const TrackerOptions& options, const Surface& surface) {
-    return std::min(options.tolerance, kBandShare * surface.reach());
-}
-
 /// What is smaller need not be looked at, world units. In the paper's method the tolerance has no say.
 double detail_of(const TrackerOptions& options, const Surface& surface) {
     if (options.method == Method::Paper) return surface.resolution();
-    double enough = kDetail * tolerance_of(options, surface);
+    double enough = kDetail * effective_tolerance(options, surface);
     if (options.max_edge) enough = std::min(enough, kDetailOfEdges * *options.max_edge);
     return std::max(surface.resolution(), enough);
 }
@@ -350,7 +347,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     std::optional<Inspector>& inspector = work->inspector;
     Inspection& inspection = work->inspection;
     auto& seconds = frame.seconds;
-    frame.tolerance = l.tolerance;
+    frame.tolerance = effective_tolerance(options, surface);
     frame.delaunay_strategy = name_of(strategy());
     const std::size_t relocated = dt->profile().relocated;
     const std::size_t before = particles.size();
@@ -523,10 +520,14 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     return [work] { return std::move(work->frame); };
 }
 
+double effective_tolerance(const TrackerOptions& options, const Surface& surface) {
+    return std::min(options.tolerance, kBandShare * surface.reach());
+}
+
 SizingLimits sizing_limits(const TrackerOptions& options, const Surface& surface) {
     const double detail = detail_of(options, surface);
     SizingLimits l{};
-    l.tolerance = tolerance_of(options, surface);
+    l.tolerance = effective_tolerance(options, surface) * std::min(1.0, surface.slope() / kFullSlope);
     l.angle = options.angle_deg.value_or(default_angle_deg(options.method)) * kPi / 180.0;
     l.angle_floor = kAngleFloor * detail;
     l.min_edge = options.min_edge.value_or(kLeastEdge * detail);

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <functional>
 
 #include "isotrack/surface/shapes.h"
 
@@ -49,6 +51,43 @@ TEST_F(TwoBumps, AreToldApartWhereTheErrorIsLarge) {
 TEST_F(TwoBumps, AreToldApartWhereValuesChangeSteeply) {
     EXPECT_NEAR(found(1.0, 0.7).largest, 0.9, 1e-3);
     EXPECT_LT((found(1.0, 0.7).where - narrow).norm(), 0.05);
+}
+
+/// A triangle in the plane z = 0, about its middle, turned about the x axis.
+std::array<Vec3, 3> turned(double degrees, double size) {
+    const double turn = degrees * 3.14159265358979323846 / 180.0, along = std::cos(turn), up = std::sin(turn);
+    const auto at = [&](double x, double y) -> Vec3 { return size * Vec3(x, along * y, up * y); };
+    return {at(-0.5, -0.3), at(0.5, -0.3), at(0.0, 0.6)};
+}
+
+double deviation(const std::array<Vec3, 3>& t, const std::function<double(const Vec3&)>& value) {
+    const auto surface = shapes::from_function(value, Box(Vec3(-9, -9, -9), Vec3(9, 9, 9)), 1.0);
+    return normal_deviation(t[0], t[1], t[2], *surface->probe(), surface->resolution());
+}
+
+TEST(NormalDeviation, IsTheAngleToAPlane) {
+    for (const double degrees : {0.0, 20.0, 59.0, 75.0, 120.0, 180.0})
+        EXPECT_NEAR(deviation(turned(degrees, 3.0), [](const Vec3& p) { return p.z(); }), degrees, 0.01);
+}
+
+TEST(NormalDeviation, IsThatToEitherSideOfACrease) {
+    const auto roof = [](const Vec3& p) { return std::max(p.x(), p.z()); };
+    // On the side that looks along x, with a tip beyond the crease that takes the centroid across.
+    const std::array<Vec3, 3> tip = {Vec3(-0.2, 0, -0.3), Vec3(-0.2, 1.5, -0.3), Vec3(-0.2, 0.7, 0.7)};
+    const Vec3 normal = (tip[1] - tip[0]).cross(tip[2] - tip[0]).normalized();
+    ASSERT_NEAR(normal.x(), 1.0, 1e-12);
+    ASSERT_GT(((tip[0] + tip[1] + tip[2]) / 3.0).z(), -0.2);
+    EXPECT_NEAR(deviation(tip, roof), 0.0, 0.01);
+    // Neither side looks the other way.
+    EXPECT_NEAR(deviation({tip[0], tip[2], tip[1]}, roof), 90.0, 0.01);
+}
+
+TEST(NormalDeviation, SaysNothingOfWhatIsSmallOrHasNoNormal) {
+    const auto plane = [](const Vec3& p) { return p.z(); };
+    EXPECT_GT(deviation(turned(120.0, 0.6), plane), 0.0);  // 0.54 high
+    EXPECT_EQ(deviation(turned(120.0, 0.5), plane), 0.0);
+    EXPECT_GT(deviation(turned(120.0, 3.0), [](const Vec3& p) { return 0.7 * p.z(); }), 0.0);
+    EXPECT_EQ(deviation(turned(120.0, 3.0), [](const Vec3& p) { return 0.5 * p.z(); }), 0.0);
 }
 
 }  // namespace

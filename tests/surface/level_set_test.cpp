@@ -294,6 +294,37 @@ TEST(LevelSet, TurnsAnUnknownUnitIntoWorldUnits) {
     EXPECT_NEAR(level_set.probe()->value({1.04, 0, 0}), 0.04, 0.002);
 }
 
+TEST(LevelSet, KnowsTheSlopeOfItsValues) {
+    // Interpolated distances of a ball of one and a half voxels are too short; by how much a sampler of
+    // OpenVDB's says, along rays through its middle.
+    struct Slopes {
+        double measured, expected;
+    };
+    const auto slopes_of = [](double radius, double unit) {
+        const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+            static_cast<float>(radius), openvdb::Vec3f(0.3f, 0.1f, 0.2f), 1.0f, 3.0f);
+        const openvdb::tools::GridSampler<openvdb::FloatGrid, openvdb::tools::BoxSampler> sampler(*grid);
+        double sum = 0.0;
+        int count = 0;
+        for (double z = -0.95; z < 1.0; z += 0.1)
+            for (double turn = 0.05; turn < 6.28; turn += 0.1, ++count) {
+                const double beside = std::sqrt(1.0 - z * z);
+                const openvdb::Vec3d ray(beside * std::cos(turn), beside * std::sin(turn), z),
+                    middle(0.3, 0.1, 0.2);
+                sum += sampler.wsSample(middle + (radius + 0.5) * ray) -
+                       sampler.wsSample(middle + (radius - 0.5) * ray);
+            }
+        grid->setTransform(uniform(unit));  // distances in voxels
+        return Slopes{LevelSet(grid).slope(), std::min(1.0, sum / count)};
+    };
+    for (const double unit : {1.0, 0.1}) {
+        const Slopes small = slopes_of(1.5, unit), large = slopes_of(20.0, unit);
+        EXPECT_NEAR(small.measured, small.expected, 0.05);
+        EXPECT_LT(small.measured, 0.95);
+        EXPECT_NEAR(large.measured, large.expected, 0.01);
+    }
+}
+
 TEST(LevelSet, LeavesTheGridItWasGivenAlone) {
     const auto grid = sphere_grid<openvdb::FloatGrid>(uniform(0.1), 0.3, 10.0);
     const auto before = grid->deepCopy();

@@ -511,6 +511,40 @@ TEST(Patches, MendWhatIsTooFarOffAndLeaveTheRest) {
     EXPECT_EQ(patch_failing(now.trials, thickness, surface), 0u);
 }
 
+TEST(Patches, MendWhatIsTurnedOver) {
+    const LevelSet surface(grid_of(to_balls));
+    const Carved carved(surface, 0.5, 0.8);
+    FrameMesh mesh = carved.mesh();
+    const auto top = std::max_element(mesh.vertices.begin(), mesh.vertices.end(),
+                                      [](const Vec3& a, const Vec3& b) { return a.y() < b.y(); });
+    // Along the surface past its neighbours: nothing is farther off.
+    *top = *surface.probe()->project(*top + Vec3(2.0, -0.3, 0.3));
+    Inspected now(carved, mesh);
+    ASSERT_TRUE(now.inspection.missed.empty());
+    ASSERT_FALSE(now.trials.failing_places().empty());
+    TrackedFrame frame;
+    frame.tolerance = 0.5;
+    report(mesh, now.inspection, surface, frame);
+    EXPECT_LE(frame.max_error, 0.5);
+    EXPECT_GE(frame.most_turned_deg, kTurnedOver);
+    EXPECT_FALSE(frame.within_tolerance);
+
+    EXPECT_GT(patch_failing(now.trials, std::vector<double>(carved.particles.size(), 9.0), surface), 0u);
+    EXPECT_TRUE(now.trials.failing_places().empty());
+    expect_sound(mesh);
+    const Vec3 middle(0.1, 0.2, 0.3);
+    for (const auto& [i, j, k] : mesh.carved.triangles) {
+        const Vec3 &a = mesh.vertices[i], &b = mesh.vertices[j], &c = mesh.vertices[k];
+        const Vec3 area = (b - a).cross(c - a);
+        const bool is_high = area.norm() > 0.5 * std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+        EXPECT_TRUE((a - middle).norm() > 6.0 || !is_high || area.dot(a - middle) > 0.0);
+    }
+    TrackedFrame mended;
+    mended.tolerance = 0.5;
+    report(mesh, now.inspection, surface, mended);
+    EXPECT_TRUE(mended.within_tolerance);
+}
+
 /// A ball with a spike of one line of nodes.
 openvdb::FloatGrid::Ptr ball_with_spike() {
     auto grid = openvdb::FloatGrid::create(3.0f);

@@ -145,6 +145,21 @@ LevelSet grid_of(const Solid& solid) {
     return LevelSet(grid);
 }
 
+/// The triangles at least half a voxel high that face away from the surface's normals, where it has any.
+std::size_t facing_away(const TriangleMesh& mesh, const LevelSet& surface) {
+    std::size_t count = 0;
+    const auto probe = surface.probe();
+    for (const auto& [i, j, k] : mesh.triangles) {
+        const Vec3 &a = mesh.points[i], &b = mesh.points[j], &c = mesh.points[k];
+        const Vec3 area = (b - a).cross(c - a), middle = (a + b + c) / 3.0;
+        const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+        if (area.norm() < 0.5 * longest || probe->sample(middle).gradient.norm() < 0.6) continue;
+        count += std::max({area.dot(probe->normal(middle)), area.dot(probe->normal(a)),
+                           area.dot(probe->normal(b)), area.dot(probe->normal(c))}) < 0.0;
+    }
+    return count;
+}
+
 class Topology : public ::testing::TestWithParam<Solid> {};
 
 TEST_P(Topology, IsThatOfTheLevelSet) {
@@ -168,6 +183,7 @@ TEST_P(Topology, IsThatOfTheLevelSet) {
             EXPECT_EQ(topology.euler, wanted.euler);
             EXPECT_TRUE(self_intersections(result.mesh).empty());
             EXPECT_TRUE(result.within_tolerance) << result.max_error << ", lost " << result.lost_crossings;
+            EXPECT_EQ(facing_away(result.mesh, surface), 0u);
         }
     }
 }

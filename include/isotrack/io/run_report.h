@@ -24,6 +24,7 @@ struct FrameReport {
     std::string delaunay_strategy;
     std::size_t relocated = 0;  ///< Vertices the tetrahedralisation moved one by one; 0 when it was rebuilt.
     double max_error_vx = 0.0, rms_error_vx = 0.0;  ///< Both ways, in voxels.
+    double most_turned_deg = 0.0;                   ///< Between a triangle and the level set's normals.
     double min_angle_deg = 0.0;
     bool closed = true, manifold = true;
     bool opened = false;             ///< A cap was left out on purpose: the mesh is not closed there.

@@ -39,6 +39,7 @@ public:
     std::unique_ptr<Probe> probe() const override;
     double resolution() const override;
     double reach() const override;
+    double slope() const override;
     Box bounds() const override;
     Eigen::Affine3d lattice() const override;
     /// Whether the lattice cell around p has an inactive voxel of the grid as it came for a corner. A band is

@@ -39,8 +39,7 @@ double default_angle_deg(Method method);
 
 /// All lengths in world units.
 struct TrackerOptions {
-    /// > 0. Largest wanted distance between mesh and surface, either way. No more than 0.8 of the surface's
-    /// `reach()` is used: beyond it distances are not known.
+    /// > 0. Largest wanted distance between mesh and surface, either way; see `effective_tolerance`.
     double tolerance = 0.0;
     std::optional<double> angle_deg;  ///< Wanted angle between neighbours' normals, degrees in (0, 90].
                                       ///< Unset: `default_angle_deg`.
@@ -55,8 +54,15 @@ struct TrackerOptions {
     std::uint64_t seed = 1;  ///< Same seed, same surfaces: same meshes, at any thread count.
 };
 
-/// What these options come to on a surface.
+/// The tolerance, but no more than 0.8 of the surface's `reach()`: beyond it distances are not known.
+double effective_tolerance(const TrackerOptions& options, const Surface& surface);
+
+/// What these options come to on a surface. The tolerance is of values, which are less than distances where
+/// the surface's `slope()` is below 1.
 SizingLimits sizing_limits(const TrackerOptions& options, const Surface& surface);
+
+/// Degrees: a mesh with a triangle that is turned from the surface by as much or more is not certified.
+constexpr double kTurnedOver = 90.0;
 
 /// What became of one frame.
 struct TrackedFrame {
@@ -70,18 +76,23 @@ struct TrackedFrame {
     int sweeps = 0;             ///< Relaxation sweeps over all particles.
     std::size_t relocated = 0;  ///< Vertices the tetrahedralisation moved one by one.
     std::string delaunay_strategy;
-    double tolerance = 0.0;  ///< The one that was used.
-    /// The larger of the distances mesh to surface (at 28 points of each triangle) and back (at the lattice
-    /// crossings, of which those nearer to each other than two tolerances stand for one another; where they
-    /// are so far apart anyway also at points between those that are nearly too far off, at folds of the
-    /// mesh, or in cells with an ambiguous face, but for points that no vertex on the surface reaches),
-    /// measured on `mesh`, world units; RMS likewise, but for the points between. What is farther than three
-    /// tolerances from any triangle that faces its way is counted as lost instead.
+    double tolerance = 0.0;  ///< The effective one.
+    /// The larger of the distances mesh to surface (values over the surface's slope, at up to 28 points of
+    /// each triangle) and back (at the lattice crossings, of which those nearer to each other than two
+    /// tolerances stand for one another; where they are so far apart anyway also at points between those that
+    /// are nearly too far off, at folds of the mesh, or in cells with an ambiguous face, but for points that
+    /// no vertex on the surface reaches), measured on `mesh`, world units; RMS likewise, but for the points
+    /// between. What is farther than three tolerances from any triangle that faces its way is counted as lost
+    /// instead.
     double max_error = 0.0, rms_error = 0.0;
+    /// The largest angle between a triangle and the surface, by `normal_deviation`: where it is above 60
+    /// degrees certify adds particles.
+    double most_turned_deg = 0.0;
     bool opened = false;             ///< A cap was left out: the mesh has a border there.
     std::size_t lost_crossings = 0;  ///< Features below the grid's resolution that the mesh does not hold.
-    /// max_error is at most the tolerance and nothing is lost. Not so, too, where following every detail
-    /// would take more particles than half the lattice crossings (at half a voxel; more at less).
+    /// max_error is at most the tolerance, nothing is lost and nothing turned over. Not so, too, where
+    /// following every detail would take more particles than half the lattice crossings (at half a voxel;
+    /// more at less).
     bool within_tolerance = true;
     std::map<std::string, double>
         seconds;  ///< Per stage: carry, cover, size, relax, delaunay, convect, fit, certify, blunt.
