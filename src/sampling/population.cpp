@@ -209,17 +209,20 @@ int Densifier::add_or_nearest(const Vec3& place, double h) {
     if (!(n.squaredNorm() > 0.0)) return nearest;
     const double apart = kApart * h,
                  far = std::max(apart, std::min(kFar * h, kFarthest * surface_.resolution()));
-    const double looked_at = std::max(far, kApart * widest_of_call_);
+    const double crowded = kApart * widest_of_call_;
     double least = far * far;
     bool taken = false;
-    grid_.for_each_within(p, looked_at, [&](int i, double d2) {
-        if (!(particles_.normal[i].dot(n) > 0.0)) return;
-        const double own = kApart * particles_.spacing[i];
-        taken = taken || (i >= first_of_call_ && d2 < own * own);
-        if (d2 > least) return;
-        least = d2;
-        nearest = i;
-    });
+    for (double reach = std::max(apart, crowded); nearest < 0; reach = std::min(2.0 * reach, far)) {
+        grid_.for_each_within(p, reach, [&](int i, double d2) {
+            if (!(particles_.normal[i].dot(n) > 0.0)) return;
+            const double own = kApart * particles_.spacing[i];
+            taken = taken || (i >= first_of_call_ && d2 < own * own);
+            if (d2 > least) return;
+            least = d2;
+            nearest = i;
+        });
+        if (reach >= far) break;
+    }
     const double distance = std::sqrt(least);
     if (taken) return kTaken;
     if (nearest >= 0 && distance < std::min(apart, kApart * particles_.spacing[nearest])) return nearest;
