@@ -23,7 +23,8 @@ constexpr double kOffPlane =
 constexpr double kGrazing = 0.01, kHere = 0.1;  // kHere: spacings of the crossings
 constexpr double kRounding = 1e-5;              // of a particle's normal
 constexpr std::size_t kBatch = 128;
-constexpr double kLargestSeed = 5.0;  // spacings of the crossings: above it small features are stepped over
+// Above it small features are stepped over: spacings of the crossings, or tolerances or resolutions.
+constexpr double kLargestSeed = 5.0, kLargestSeedForError = 10.0;
 
 /// A shuffled order that depends on the seed and the count alone [splitmix64].
 std::uint64_t mix(std::uint64_t x) {
@@ -80,15 +81,16 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
         double spacing = 0.0;  // none: there is no surface here
     };
     ThreadProbes probes(surface);
+    const double largest =
+        std::max({kLargestSeed * spacing, limits.min_edge,
+                  kLargestSeedForError * std::min(limits.tolerance, surface.resolution())});
     const auto seed_at = [&](int c, Surface::Probe& probe) -> Seed {
         const Vec3 start = grid[c].point;
         const auto p = probe.project(start);
         if (!p || (*p - start).norm() > 1.5 * surface.resolution()) return {};
         const Vec3 n = probe.normal(*p);
         if (!(n.squaredNorm() > 0.0)) return {};
-        return {*p, n,
-                std::min(spacing_from_curvature(probe, *p, n, spacing, limits),
-                         std::max(kLargestSeed * spacing, limits.min_edge))};
+        return {*p, n, std::min(spacing_from_curvature(probe, *p, n, spacing, limits), largest)};
     };
     std::size_t added = 0;
     std::vector<int> batch;
