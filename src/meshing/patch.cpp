@@ -10,7 +10,9 @@
 #include <utility>
 
 #include "disjoint_sets.h"
+#include "meshing/crossing_triangles.h"
 #include "meshing/triangle_distance.h"
+#include "sampling/compact.h"
 
 namespace isotrack {
 namespace {
@@ -19,6 +21,7 @@ constexpr double kSeam = 0.6;      // spacings: vertices that come are no nearer
 constexpr double kMargin = 2.0;    // spacings: how far what comes may be from what goes
 constexpr double kFarthest = 4.0;  // spacings, on average: loops farther apart do not match
 constexpr double kFar = std::numeric_limits<double>::infinity();
+constexpr int kMostRounds = 8;               // of leaving out what a strip crosses
 constexpr std::size_t kMostSteps = 1 << 20;  // of a strip: the product of the lengths of its loops
 
 using Loop = std::vector<int>;
@@ -100,22 +103,37 @@ std::vector<Loop> loops_of(const std::vector<std::pair<int, int>>& border) {
     return result;
 }
 
+Vec3 area(const Triangle& t, const std::vector<Vec3>& at) {
+    return (at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]);
+}
+
 /// Triangles between two loops that run the same way round, the first outside the second, with the shortest
-/// edges across. Empty where there are too many ways.
-std::vector<Triangle> strip_between(const Loop& outer, const Loop& inner,
-                                    const std::vector<Vec3>& outer_points,
-                                    const std::vector<Vec3>& inner_points, int first_inner) {
+/// edges across among those that face as the `normals` at the second do. Empty where there are too many ways.
+std::vector<Triangle> strip_between(const Loop& outer, const Loop& inner, const std::vector<Vec3>& points,
+                                    const std::vector<Vec3>& normals) {
+    constexpr double kFlatStrip = 0.01;  // twice the area over the square of the longest edge
+    constexpr double kPenalty = 100.0;   // squares of the longest edge
     const std::size_t m = outer.size(), n = inner.size();
     if ((m + 1) * (n + 1) > kMostSteps) return {};
     std::size_t i0 = 0, j0 = 0;
+    const auto out = [&](std::size_t i) { return outer[(i0 + i) % m]; };
+    const auto in = [&](std::size_t j) { return inner[(j0 + j) % n]; };
     const auto across = [&](std::size_t i, std::size_t j) {
-        return (outer_points[outer[(i0 + i) % m]] - inner_points[inner[(j0 + j) % n]]).squaredNorm();
+        return (points[out(i)] - points[in(j)]).squaredNorm();
     };
     std::pair<std::size_t, std::size_t> nearest;
     for (std::size_t i = 0; i < m; ++i)
         for (std::size_t j = 0; j < n; ++j)
             if (across(i, j) < across(nearest.first, nearest.second)) nearest = {i, j};
     std::tie(i0, j0) = nearest;
+    const auto penalty = [&](const Triangle& t, const Vec3& normal) {
+        const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+        const double longest2 =
+            std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+        return area(t, points).dot(normal) > kFlatStrip * longest2 ? 0.0 : kPenalty * longest2;
+    };
+    const auto by_outer = [&](std::size_t i, std::size_t j) { return Triangle{out(i - 1), out(i), in(j)}; };
+    const auto by_inner = [&](std::size_t i, std::size_t j) { return Triangle{out(i), in(j), in(j - 1)}; };
     // The least sum of squares on the way from (0, 0) to (i, j). It begins along the outer loop and ends
     // along the inner one, so that no edge across comes twice.
     std::vector<double> sum((m + 1) * (n + 1), kFar);
@@ -125,17 +143,17 @@ std::vector<Triangle> strip_between(const Loop& outer, const Loop& inner,
     for (std::size_t i = 1; i <= m; ++i)
         for (std::size_t j = 0; j <= n; ++j) {
             if ((i == m && j == 0) || (i < m && j == n)) continue;
-            const double by_outer = sum[at(i - 1, j)], by_inner = j > 0 ? sum[at(i, j - 1)] : kFar;
-            from_outer[at(i, j)] = by_outer < by_inner;
-            sum[at(i, j)] = std::min(by_outer, by_inner) + across(i, j);
+            const Vec3& normal = normals[in(j)];
+            const double outer_sum = sum[at(i - 1, j)] + penalty(by_outer(i, j), normal);
+            const double inner_sum = j > 0 ? sum[at(i, j - 1)] + penalty(by_inner(i, j), normal) : kFar;
+            from_outer[at(i, j)] = outer_sum < inner_sum;
+            sum[at(i, j)] = std::min(outer_sum, inner_sum) + across(i, j);
         }
     std::vector<Triangle> result;
     for (std::size_t i = m, j = n; i + j > 0;) {
-        const int p = outer[(i0 + i) % m], q = first_inner + inner[(j0 + j) % n];
-        if (from_outer[at(i, j)])
-            result.push_back({outer[(i0 + --i) % m], p, q});
-        else
-            result.push_back({p, q, first_inner + inner[(j0 + --j) % n]});
+        const bool outwards = from_outer[at(i, j)];
+        result.push_back(outwards ? by_outer(i, j) : by_inner(i, j));
+        --(outwards ? i : j);
     }
     return result;
 }
@@ -165,10 +183,6 @@ Part part_within(const Box& bounds, const TriangleBins& mesh) {
         }
     }
     return result;
-}
-
-Vec3 area(const Triangle& t, const std::vector<Vec3>& at) {
-    return (at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]);
 }
 
 /// The vertices of a source within its seam along some edges, ascending.
@@ -203,8 +217,7 @@ std::vector<char> coming_vertices(const Part& part, const TriangleBins& mesh, co
 
 /// For each of some loops another that is near; none where they do not match one to one. Others may be left.
 std::vector<int> matches(const std::vector<Loop>& loops, const std::vector<Loop>& others,
-                         const std::vector<Vec3>& points, const std::vector<Vec3>& other_points,
-                         double farthest) {
+                         const std::vector<Vec3>& points, double farthest) {
     std::vector<int> result;
     for (const Loop& loop : loops) {
         double least = farthest;
@@ -214,7 +227,7 @@ std::vector<int> matches(const std::vector<Loop>& loops, const std::vector<Loop>
             for (const int v : loop) {
                 double nearest = kFar;
                 for (const int w : others[o])
-                    nearest = std::min(nearest, (points[v] - other_points[w]).squaredNorm());
+                    nearest = std::min(nearest, (points[v] - points[w]).squaredNorm());
                 sum += std::sqrt(nearest);
             }
             if (sum / static_cast<double>(loop.size()) < least) {
@@ -226,6 +239,42 @@ std::vector<int> matches(const std::vector<Loop>& loops, const std::vector<Loop>
         result.push_back(best);
     }
     return result;
+}
+
+template <typename IsOut>
+void leave_out(std::vector<Triangle>& triangles, const IsOut& is_out) {
+    triangles.erase(std::remove_if(triangles.begin(), triangles.end(), is_out), triangles.end());
+}
+
+/// The strips from some loops to the borders of what comes, of which it leaves out pieces without a loop that
+/// matches; others must match with all of theirs. nullopt where they do not.
+std::optional<std::vector<Triangle>> join(const std::vector<Loop>& outer, std::vector<Triangle>& coming,
+                                          const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
+                                          double farthest) {
+    for (auto bad = pinched(border_of(coming)); !bad.empty(); bad = pinched(border_of(coming)))
+        leave_out(coming, [&](const Triangle& t) { return has_any(t, bad); });
+    const std::vector<Loop> inner = loops_of(border_of(coming));
+    const std::vector<int> match = matches(outer, inner, points, farthest);
+    if (match.size() != outer.size()) return std::nullopt;
+    DisjointSets pieces(normals.size());
+    for (const Triangle& t : coming)
+        for (const int v : {t[1], t[2]}) pieces.join(t[0], v);
+    std::vector<char> is_matched(normals.size(), 0), is_out(normals.size(), 0);
+    const auto piece_of = [&](const Loop& loop) { return pieces.least(loop.front()); };
+    for (const int o : match) is_matched[piece_of(inner[o])] = 1;
+    for (std::size_t o = 0; o < inner.size(); ++o) {
+        if (std::find(match.begin(), match.end(), static_cast<int>(o)) != match.end()) continue;
+        if (is_matched[piece_of(inner[o])]) return std::nullopt;
+        is_out[piece_of(inner[o])] = 1;
+    }
+    leave_out(coming, [&](const Triangle& t) { return is_out[pieces.least(t[0])] != 0; });
+    std::vector<Triangle> strips;
+    for (std::size_t o = 0; o < outer.size(); ++o) {
+        const auto strip = strip_between(outer[o], inner[match[o]], points, normals);
+        if (strip.empty()) return std::nullopt;
+        strips.insert(strips.end(), strip.begin(), strip.end());
+    }
+    return strips;
 }
 
 constexpr int kNotLookedFor = -2;
@@ -240,6 +289,7 @@ PatchSource::PatchSource(TriangleMesh mesh, double spacing)
       beside_(mesh_.points.size(), kNotLookedFor) {
     for (const Triangle& t : mesh_.triangles)
         for (const int v : t) normal_[v] += area(t, mesh_.points);
+    for (Vec3& n : normal_) n.normalize();
 }
 
 void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBins& mesh) {
@@ -305,39 +355,50 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
     const Vec3 margin = Vec3::Constant(kMargin * source.spacing());
     Part part = part_within(Box(bounds.min() - margin, bounds.max() + margin), source.bins());
     const auto comes = coming_vertices(part, mesh, patch.gone, border, source);
-    for (const int v : part.vertices) patch.points.push_back(source.bins().points()[v]);
-    std::vector<Triangle>& coming = part.triangles;
-    const auto leave_out = [&](const auto& is_out) {
-        coming.erase(std::remove_if(coming.begin(), coming.end(), is_out), coming.end());
+    // What comes and the border have numbers of their own, the border's behind the others.
+    const auto own = part.vertices.size();
+    std::vector<Vec3> at, normals;
+    for (const int v : part.vertices) {
+        at.push_back(source.bins().points()[v]);
+        normals.push_back(source.normal(v));
+    }
+    patch.points = at;
+    std::vector<int> rim;
+    for (const auto& edge : border) {
+        rim.push_back(edge.first);
+        at.push_back(points[edge.first]);
+    }
+    const auto on_rim = [&](int v) {
+        return static_cast<int>(own) +
+               static_cast<int>(std::lower_bound(rim.begin(), rim.end(), v) - rim.begin());
     };
-    leave_out(
-        [&](const Triangle& t) { return std::any_of(t.begin(), t.end(), [&](int v) { return !comes[v]; }); });
-    for (auto bad = pinched(border_of(coming)); !bad.empty(); bad = pinched(border_of(coming)))
-        leave_out([&](const Triangle& t) { return has_any(t, bad); });
+    std::vector<std::pair<int, int>> outline;
+    for (const auto& [from, to] : border) outline.emplace_back(on_rim(from), on_rim(to));
+    const std::vector<Loop> outer = loops_of(outline);
 
-    // Pieces without a loop that matches are left out, others must match with all of theirs.
-    const std::vector<Loop> outer = loops_of(border), inner = loops_of(border_of(coming));
-    const std::vector<int> match = matches(outer, inner, points, patch.points, kFarthest * source.spacing());
-    if (match.size() != outer.size()) return std::nullopt;
-    DisjointSets pieces(part.vertices.size());
-    for (const Triangle& t : coming)
-        for (const int v : {t[1], t[2]}) pieces.join(t[0], v);
-    std::vector<char> is_matched(part.vertices.size(), 0), is_out(part.vertices.size(), 0);
-    const auto piece_of = [&](const Loop& loop) { return pieces.least(loop.front()); };
-    for (const int o : match) is_matched[piece_of(inner[o])] = 1;
-    for (std::size_t o = 0; o < inner.size(); ++o) {
-        if (std::find(match.begin(), match.end(), static_cast<int>(o)) != match.end()) continue;
-        if (is_matched[piece_of(inner[o])]) return std::nullopt;
-        is_out[piece_of(inner[o])] = 1;
+    std::vector<Triangle>& coming = part.triangles;
+    leave_out(coming, [&](const Triangle& t) {
+        return std::any_of(t.begin(), t.end(), [&](int v) { return !comes[v]; });
+    });
+    std::vector<Triangle> all;
+    // What comes and is crossed by a strip makes way for it.
+    for (int round = 0; round < kMostRounds; ++round) {
+        const auto strips = join(outer, coming, at, normals, kFarthest * source.spacing());
+        if (!strips) return std::nullopt;
+        all = coming;
+        all.insert(all.end(), strips->begin(), strips->end());
+        std::vector<char> is_strip(coming.size(), 0);
+        is_strip.resize(all.size(), 1);
+        std::vector<char> stays = crossing_triangles(at, all, is_strip);
+        stays.resize(coming.size());
+        for (char& flag : stays) flag = !flag;
+        if (std::find(stays.begin(), stays.end(), 0) == stays.end()) break;
+        compact(coming, stays);
     }
-    leave_out([&](const Triangle& t) { return is_out[pieces.least(t[0])] != 0; });
-    const int first = static_cast<int>(points.size());
-    for (const auto& [i, j, k] : coming) patch.triangles.push_back({first + i, first + j, first + k});
-    for (std::size_t o = 0; o < outer.size(); ++o) {
-        const auto strip = strip_between(outer[o], inner[match[o]], points, patch.points, first);
-        if (strip.empty()) return std::nullopt;
-        patch.triangles.insert(patch.triangles.end(), strip.begin(), strip.end());
-    }
+    for (Triangle& t : all)
+        for (int& v : t)
+            v = static_cast<std::size_t>(v) < own ? static_cast<int>(points.size()) + v : rim[v - own];
+    patch.triangles = std::move(all);
     const Numbers now = numbers_of(patch.triangles), before = numbers_of(going);
     patch.components = now.components - before.components;
     patch.euler = now.euler - before.euler;

@@ -28,6 +28,7 @@ public:
 
     double spacing() const { return spacing_; }
     const TriangleBins& bins() const { return bins_; }
+    const Vec3& normal(int vertex) const { return normal_[vertex]; }  ///< Unit, or zero.
 
     /// Finds, by several threads, for each of some vertices the triangle of `mesh` that is nearest, among
     /// those that face the same way if any of them is near; -1 if there is none.
@@ -49,9 +50,10 @@ private:
 std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh);
 
 /// `gone`, with a border that is pinched nowhere, goes. The triangles of `source` that are nearest to them
-/// come, less a seam about as wide as its spacing; strips of triangles fill the seam from each loop of the
-/// one border to one of the other. nullopt where the loops do not match. The mesh must be closed and
-/// manifold, and so is what it becomes, but for edges that it may have twice; it may cross itself.
+/// come, less a seam about as wide as its spacing; strips of triangles that face as the source does fill the
+/// seam from each loop of the one border to one of the other, and what they cross of what comes is left out.
+/// nullopt where the loops do not match. The mesh must be closed and manifold, and so is what it becomes, but
+/// for edges that it may have twice; it may cross itself.
 std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source);
 
 }  // namespace isotrack

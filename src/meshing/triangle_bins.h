@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "isotrack/types.h"
+#include "meshing/triangle_box.h"
 
 namespace isotrack {
 
@@ -17,11 +18,7 @@ public:
 
     const std::vector<Vec3>& points() const { return points_; }
     const std::vector<Triangle>& triangles() const { return triangles_; }
-    Box box_of(int triangle) const {
-        const auto& [i, j, k] = triangles_[triangle];
-        return Box(points_[i].cwiseMin(points_[j]).cwiseMin(points_[k]),
-                   points_[i].cwiseMax(points_[j]).cwiseMax(points_[k]));
-    }
+    Box box_of(int triangle) const { return isotrack::box_of(points_, triangles_[triangle]); }
 
     /// Those whose boxes meet this one, ascending.
     std::vector<int> meeting(const Box& box) const;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <utility>
@@ -63,6 +64,18 @@ std::vector<Vec3> suspicious_places(const FrameMesh& mesh, const LatticeTopology
     for (const int p : mesh.carved.particle) at_thin.push_back(p >= 0 && thickness[p] < kThin * resolution);
     for (const int v : small_handles(mesh.vertices, mesh.carved.triangles, at_thin, kSmall * resolution))
         result.push_back(mesh.vertices[v]);
+    return apart(result, kApart * resolution);
+}
+
+/// Where the mesh may have another topology than the lattice although nothing tells: small handles anywhere,
+/// and where lattice nodes are joined across a face.
+std::vector<Vec3> other_places(const FrameMesh& mesh, const Surface& surface) {
+    const double resolution = surface.resolution();
+    std::vector<Vec3> result;
+    for (const int v : small_handles(mesh.vertices, mesh.carved.triangles,
+                                     std::vector<char>(mesh.vertices.size(), 1), kSmall * resolution))
+        result.push_back(mesh.vertices[v]);
+    for (const auto& diagonal : surface.diagonals()) result.push_back(0.5 * (diagonal.from + diagonal.to));
     return apart(result, kApart * resolution);
 }
 
@@ -220,12 +233,12 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         some->insert(some->end(), unmatched.begin(), unmatched.end());
         if (some->size() > kMostPlaces) some->resize(kMostPlaces);
     }
-    Patcher patcher(trials, places, surface);
+    auto patcher = std::make_unique<Patcher>(trials, places, surface);
     std::size_t count = 0;
     std::set<std::array<double, 3>> around;  // vertices where a patch would be right, but did not fit
     const auto patch_at = [&](const Vec3& place, double reach, long most) {
         long then = 0;
-        const auto taken = patcher.patch_at(
+        const auto taken = patcher->patch_at(
             place, reach, [](const Patch& patch) { return patch.euler != 0 || patch.components != 0; },
             [&](const MeshTopology& topology) { return (then = astray(topology)) <= most; },
             [&](FrameMesh other) { return trials.try_mesh(std::move(other)); });
@@ -240,18 +253,25 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const auto patch_near = [&](const std::vector<Vec3>& some, long worse) {
         for (const double reach : kReaches)
             for (const Vec3& place : some)
-                if (now > 0 && !patcher.is_worn_out()) patch_at(place, reach, now + worse);
-        patcher.try_again();
+                if (now > 0 && !patcher->is_worn_out()) patch_at(place, reach, now + worse);
+        patcher->try_again();
     };
-    for (const auto* some : {&likely, &places}) {
-        patch_near(*some, -1);
+    const auto search = [&](const std::vector<Vec3>& some) {
+        patch_near(some, -1);
         std::vector<Vec3> more;
         for (const auto& [x, y, z] : around) more.emplace_back(x, y, z);
         patch_near(apart(more, kApart * resolution), -1);
         // Two handles too many here may hide that one is missing elsewhere.
-        patch_near(*some, 0);
-        patch_near(*some, -1);
-    }
+        patch_near(some, 0);
+        patch_near(some, -1);
+    };
+    search(likely);
+    search(places);
+    if (now == 0 || patcher->is_worn_out()) return count;
+    std::vector<Vec3> others = other_places(trials.mesh(), surface);
+    if (others.size() > kMostPlaces) others.resize(kMostPlaces);
+    patcher = std::make_unique<Patcher>(trials, others, surface);
+    search(others);
     return count;
 }
 

@@ -4,7 +4,9 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 
 #include "isotrack/compare/baselines.h"
 #include "isotrack/meshing/mesh_topology.h"
@@ -110,6 +112,65 @@ TEST(Patch, BringsTheOtherMeshsTopology) {
     ASSERT_TRUE(part.has_value());
     EXPECT_EQ(part->euler, 2);
     expect_sound(patched(joined, *part), 2, 4);
+}
+
+/// A cube of half edge 12, turned, as a level set at voxels of 1.
+TriangleMesh fine_cube(const Mat3& turn) {
+    auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    auto values = grid->getAccessor();
+    for (int x = -24; x <= 24; ++x)
+        for (int y = -24; y <= 24; ++y)
+            for (int z = -24; z <= 24; ++z) {
+                const Vec3 beyond = (turn.transpose() * Vec3(x, y, z)).cwiseAbs() - Vec3::Constant(12.0);
+                const double d = beyond.cwiseMax(0.0).norm() + std::min(0.0, beyond.maxCoeff());
+                if (std::abs(d) < 3.0)
+                    values.setValue({x, y, z}, static_cast<float>(d));
+                else if (d < 0.0)
+                    values.setValueOff({x, y, z}, -3.0f);
+            }
+    return volume_to_mesh(LevelSet(grid));
+}
+
+/// The same with triangles 6 large.
+TriangleMesh coarse_cube(const Mat3& turn) {
+    constexpr int kCells = 4;
+    std::map<std::array<int, 3>, int> number;
+    TriangleMesh mesh;
+    const auto vertex = [&](std::array<int, 3> at) {
+        const auto [entry, is_new] = number.try_emplace(at, static_cast<int>(mesh.points.size()));
+        if (is_new) mesh.points.push_back(turn * (Vec3(at[0], at[1], at[2]) * 6.0 - Vec3::Constant(12.0)));
+        return entry->second;
+    };
+    for (int axis = 0; axis < 3; ++axis)
+        for (const int side : {0, kCells})
+            for (int u = 0; u < kCells; ++u)
+                for (int v = 0; v < kCells; ++v) {
+                    const auto at = [&](int du, int dv) {
+                        std::array<int, 3> node{};
+                        node[axis] = side;
+                        node[(axis + 1) % 3] = u + (side > 0 ? du : dv);
+                        node[(axis + 2) % 3] = v + (side > 0 ? dv : du);
+                        return vertex(node);
+                    };
+                    mesh.triangles.push_back({at(0, 0), at(1, 0), at(1, 1)});
+                    mesh.triangles.push_back({at(0, 0), at(1, 1), at(0, 1)});
+                }
+    return mesh;
+}
+
+TEST(Patch, CrossesNothingAmongLargeTriangles) {
+    const Mat3 turn = Eigen::AngleAxisd(0.4, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+    const TriangleMesh fine = fine_cube(turn), coarse = coarse_cube(turn);
+    expect_sound(coarse, 1, 2);
+    for (const double reach : {1.0, 2.0, 3.5, 5.0})
+        for (const Vec3& place : {Vec3(12, 1, 2), Vec3(12, 12, 3), Vec3(-12, 12, 0.5), Vec3(12, 12, 12),
+                                  Vec3(3, -12, 12), Vec3(-12, -12, 12), Vec3(-4, -5, -12)}) {
+            const auto patch = patch_around(turn * place, reach, coarse, fine, 1.0);
+            ASSERT_TRUE(patch.has_value()) << reach << ", " << place.transpose();
+            EXPECT_EQ(patch->euler, 0);
+            expect_sound(patched(coarse, *patch), 1, 2);
+        }
 }
 
 }  // namespace
