@@ -111,7 +111,7 @@ Vec3 area(const Triangle& t, const std::vector<Vec3>& at) {
 /// edges across among those that face as the `normals` at the second do. Empty where there are too many ways.
 std::vector<Triangle> strip_between(const Loop& outer, const Loop& inner, const std::vector<Vec3>& points,
                                     const std::vector<Vec3>& normals) {
-    constexpr double kFlatStrip = 0.01;  // twice the area over the square of the longest edge
+    constexpr double kFlatStrip = 0.05;  // twice the area over the square of the longest edge
     constexpr double kPenalty = 100.0;   // squares of the longest edge
     const std::size_t m = outer.size(), n = inner.size();
     if ((m + 1) * (n + 1) > kMostSteps) return {};
