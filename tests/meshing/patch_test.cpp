@@ -80,24 +80,31 @@ TEST(Patch, IsNoneWhereTheOtherMeshIsElsewhere) {
     EXPECT_FALSE(patch_around({0, 0, 5}, 0.3, sphere, support::icosphere(4), 0.1));
 }
 
-/// Two balls, and a bar between them where `joined`.
-TriangleMesh two_balls(bool joined) {
+/// Of a level set at voxels of 1.
+template <typename Distance>
+TriangleMesh mesh_of(const Eigen::Vector3i& extent, const Distance& distance) {
     auto grid = openvdb::FloatGrid::create(3.0f);
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     auto values = grid->getAccessor();
-    for (int x = -24; x <= 24; ++x)
-        for (int y = -12; y <= 12; ++y)
-            for (int z = -12; z <= 12; ++z) {
-                const Vec3 p(x, y, z);
-                double d =
-                    std::min((p - Vec3(11.6, 0.1, 0.3)).norm(), (p + Vec3(11.3, 0.2, 0.1)).norm()) - 9.2;
-                if (joined) d = std::min(d, std::max(std::hypot(y - 0.1, z + 0.2) - 1.4, std::abs(x) - 11.0));
+    for (int x = -extent.x(); x <= extent.x(); ++x)
+        for (int y = -extent.y(); y <= extent.y(); ++y)
+            for (int z = -extent.z(); z <= extent.z(); ++z) {
+                const double d = distance(Vec3(x, y, z));
                 if (std::abs(d) < 3.0)
                     values.setValue({x, y, z}, static_cast<float>(d));
                 else if (d < 0.0)
                     values.setValueOff({x, y, z}, -3.0f);
             }
     return volume_to_mesh(LevelSet(grid));
+}
+
+/// Two balls, and a bar between them where `joined`.
+TriangleMesh two_balls(bool joined) {
+    return mesh_of({24, 12, 12}, [&](const Vec3& p) {
+        const double d = std::min((p - Vec3(11.6, 0.1, 0.3)).norm(), (p + Vec3(11.3, 0.2, 0.1)).norm()) - 9.2;
+        const double bar = std::max(std::hypot(p.y() - 0.1, p.z() + 0.2) - 1.4, std::abs(p.x()) - 11.0);
+        return joined ? std::min(d, bar) : d;
+    });
 }
 
 TEST(Patch, BringsTheOtherMeshsTopology) {
@@ -114,22 +121,12 @@ TEST(Patch, BringsTheOtherMeshsTopology) {
     expect_sound(patched(joined, *part), 2, 4);
 }
 
-/// A cube of half edge 12, turned, as a level set at voxels of 1.
+/// A cube of half edge 12, turned.
 TriangleMesh fine_cube(const Mat3& turn) {
-    auto grid = openvdb::FloatGrid::create(3.0f);
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
-    auto values = grid->getAccessor();
-    for (int x = -24; x <= 24; ++x)
-        for (int y = -24; y <= 24; ++y)
-            for (int z = -24; z <= 24; ++z) {
-                const Vec3 beyond = (turn.transpose() * Vec3(x, y, z)).cwiseAbs() - Vec3::Constant(12.0);
-                const double d = beyond.cwiseMax(0.0).norm() + std::min(0.0, beyond.maxCoeff());
-                if (std::abs(d) < 3.0)
-                    values.setValue({x, y, z}, static_cast<float>(d));
-                else if (d < 0.0)
-                    values.setValueOff({x, y, z}, -3.0f);
-            }
-    return volume_to_mesh(LevelSet(grid));
+    return mesh_of({24, 24, 24}, [&](const Vec3& p) {
+        const Vec3 beyond = (turn.transpose() * p).cwiseAbs() - Vec3::Constant(12.0);
+        return beyond.cwiseMax(0.0).norm() + std::min(0.0, beyond.maxCoeff());
+    });
 }
 
 /// The same with triangles 6 large.
