@@ -297,9 +297,6 @@ TEST(LevelSet, TurnsAnUnknownUnitIntoWorldUnits) {
 TEST(LevelSet, KnowsTheSlopeOfItsValues) {
     // Interpolated distances of a ball of one and a half voxels are too short; by how much a sampler of
     // OpenVDB's says, along rays through its middle.
-    struct Slopes {
-        double measured, expected;
-    };
     const auto slopes_of = [](double radius, double unit) {
         const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
             static_cast<float>(radius), openvdb::Vec3f(0.3f, 0.1f, 0.2f), 1.0f, 3.0f);
@@ -315,13 +312,14 @@ TEST(LevelSet, KnowsTheSlopeOfItsValues) {
                        sampler.wsSample(middle + (radius - 0.5) * ray);
             }
         grid->setTransform(uniform(unit));  // distances in voxels
-        return Slopes{LevelSet(grid).slope(), std::min(1.0, sum / count)};
+        return std::pair(LevelSet(grid).slope(), std::min(1.0, sum / count));
     };
     for (const double unit : {1.0, 0.1}) {
-        const Slopes small = slopes_of(1.5, unit), large = slopes_of(20.0, unit);
-        EXPECT_NEAR(small.measured, small.expected, 0.05);
-        EXPECT_LT(small.measured, 0.95);
-        EXPECT_NEAR(large.measured, large.expected, 0.01);
+        const auto [small, expected_small] = slopes_of(1.5, unit);
+        const auto [large, expected_large] = slopes_of(20.0, unit);
+        EXPECT_NEAR(small, expected_small, 0.05);
+        EXPECT_LT(small, 0.95);
+        EXPECT_NEAR(large, expected_large, 0.01);
     }
 }
 
