@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace isotrack {
@@ -32,6 +33,19 @@ bool is_taken(const Particles& particles, Adjacency::Range neighbours, const Vec
     });
 }
 
+/// Cosines and sines of the angles at which the surface around is looked at.
+const std::array<std::array<double, 2>, kWays>& ways_around() {
+    static const auto ways = [] {
+        std::array<std::array<double, 2>, kWays> result;
+        for (int way = 0; way < kWays; ++way) {
+            const double angle = way * (2.0 * M_PI / kWays);
+            result[way] = {std::cos(angle), std::sin(angle)};
+        }
+        return result;
+    }();
+    return ways;
+}
+
 }  // namespace
 
 Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, double resolution,
@@ -43,9 +57,8 @@ Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, 
     Mat3 normals = n * n.transpose();  // of the normal equations, for moves from p, as is the pull
     Vec3 pull = Vec3::Zero();
     double turned = 0.0;  // squared sines, whose mean no second eigenvalue is above
-    for (int way = 0; way < kWays; ++way) {
-        const double angle = way * (2.0 * M_PI / kWays);
-        const Vec3 to = around * (std::cos(angle) * a + std::sin(angle) * b);
+    for (const auto& [cosine, sine] : ways_around()) {
+        const Vec3 to = around * (cosine * a + sine * b);
         const Surface::Sample f = probe.sample(p + to);
         const double slope = f.gradient.norm();
         if (!(slope > 0.0)) return {};

@@ -42,11 +42,13 @@ std::optional<Vec3> Surface::Probe::project(const Vec3& start) {
         }
     }
     if (!(std::abs(f.value) <= epsilon_)) return std::nullopt;
+    projected_ = p;
+    gradient_ = f.gradient;
     return p;
 }
 
 Vec3 Surface::Probe::normal(const Vec3& p) {
-    const Vec3 gradient = sample(p).gradient;
+    const Vec3 gradient = p == projected_ ? gradient_ : sample(p).gradient;
     const double length = gradient.norm();
     if (!(length > 0.0)) return Vec3::Zero();
     return gradient / length;

@@ -134,6 +134,7 @@ bool has_flat_triangle(const Patch& patch, const FrameMesh& mesh) {
 
 /// Those of some places where a patch would change the numbers, or does not fit.
 std::vector<Vec3> doubtful(const std::vector<Vec3>& places, const FrameMesh& mesh, const Surface& surface) {
+    if (places.empty()) return {};
     const double resolution = surface.resolution();
     PatchSource lattice(surface.lattice_mesh(places, 4.0 * kSmall * resolution), resolution);
     const TriangleBins bins(mesh.vertices, mesh.carved.triangles, resolution);

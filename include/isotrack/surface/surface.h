@@ -54,6 +54,9 @@ public:
 
     private:
         double epsilon_, max_step_;
+        // The last projection: its normal is mostly asked for next.
+        Vec3 projected_ = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+        Vec3 gradient_ = Vec3::Zero();
     };
 
     virtual ~Surface() = default;
