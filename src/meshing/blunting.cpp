@@ -96,7 +96,7 @@ bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replac
 }
 
 std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& except) {
-    if (!boxes) boxes.emplace(points, triangles);
+    if (!boxes) boxes = std::make_unique<TriangleBoxes>(points, triangles);
     std::vector<Triangle> result;
     for (const int t : boxes->meeting(box))
         if (!std::binary_search(except.begin(), except.end(), t)) result.push_back(triangles[t]);
@@ -114,6 +114,7 @@ Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, st
       tolerance_(tolerance),
       open_(points.size(), 1),
       unchecked_(triangles.size(), 0) {}
+Blunter::~Blunter() = default;
 
 bool Blunter::run(int passes) {
     constexpr int kBetweenChecks = 4;  // for crossings: what crosses is taken back, and something else tried
@@ -151,7 +152,7 @@ bool Blunter::pass() {
                      reached_,
                      lost_,
                      std::vector<char>(points_.size(), 0),
-                     std::nullopt};
+                     boxes_};
     for (const auto& [sharpest, t] : sharp) {
         for (const int v : triangles_[t])
             if (mesh.touched[v]) open_[v] = 1;
@@ -159,7 +160,7 @@ bool Blunter::pass() {
         if (!change) change = nudge(mesh, t, -sharpest);
         if (!change) continue;
         for (const int changed : change->triangle) {
-            if (mesh.boxes) mesh.boxes->note(changed);
+            if (boxes_) boxes_->note(changed);
             unchecked_[changed] = 1;
             for (const int v : triangles_[changed]) open_[v] = 1;
         }
@@ -207,6 +208,9 @@ void Blunter::undo(const std::vector<char>& marked) {
         points_[change.vertex] = change.from;
         if (marked[c]) fixed_[change.vertex] = 1;
     }
+    for (std::size_t c = 0; boxes_ && c < changes_.size(); ++c)
+        if (taken[c])
+            for (const int t : changes_[c].triangle) boxes_->note(t);
     for (char& flag : taken) flag = !flag;
     compact(changes_, taken);
 }

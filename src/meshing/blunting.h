@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <set>
 #include <utility>
@@ -37,7 +38,7 @@ struct BluntedMesh {
     std::set<std::pair<int, int>>&
         lost;                   ///< Edges, ascending, that may come back and are not to be made anew.
     std::vector<char> touched;  ///< Per vertex: a change is near.
-    std::optional<TriangleBoxes> boxes = std::nullopt;  ///< Made when they are asked for.
+    std::unique_ptr<TriangleBoxes>& boxes;  ///< Made when they are asked for.
 
     double sharpness_of(const Triangle& t) const;
     Replaced replaced(std::vector<int> numbers) const;

@@ -10,11 +10,11 @@
 #include "meshing/corners.h"
 #include "meshing/sharpness.h"
 #include "surface/float_precision.h"
+#include "ways_around.h"
 
 namespace isotrack {
 namespace {
 
-constexpr int kWays = 8;                              // that are tried from each place
 constexpr double kFirstStep = 0.3, kLastStep = 0.02;  // of the mean edge
 constexpr int kHalvings = 2;                          // of a move that leaves the tolerance
 constexpr double kFitted = 0.01;                      // tolerances: what is that far off may be farther off
@@ -52,9 +52,8 @@ Vec3 bluntest_place(const Star& star, const Vec3& from, const Vec3& normal) {
     double least = star.sharpness_at(from);
     for (double step = kFirstStep; step >= kLastStep;) {
         const Vec3 centre = best;
-        for (int way = 0; way < kWays; ++way) {
-            const double angle = way * (2.0 * M_PI / kWays);
-            const Vec3 x = centre + step * star.mean_edge * (std::cos(angle) * u + std::sin(angle) * v);
+        for (const auto& [cosine, sine] : ways_around()) {
+            const Vec3 x = centre + step * star.mean_edge * (cosine * u + sine * v);
             if (const double s = star.sharpness_at(x, least); s < least) {
                 least = s;
                 best = x;

@@ -2,8 +2,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
+
+#include "ways_around.h"
 
 namespace isotrack {
 namespace {
@@ -13,8 +14,7 @@ constexpr double kNeighbourly = 2.0;  // spacings
 constexpr double kReach = 0.4;        // of the spacing
 constexpr double kRoom = 0.8;         // of the spacing: nobody that near to where it goes
 constexpr double kStill = 0.02;       // of the spacing: one that moves less is there already
-constexpr int kWays = 8;
-constexpr double kLine = 0.03;    // second eigenvalue: a crease of 20 degrees through the middle
+constexpr double kLine = 0.03;        // second eigenvalue: a crease of 20 degrees through the middle
 constexpr double kCorner = 0.15;  // third: that of a cube has 0.2, a ball of two resolutions less than 0.1
 
 bool may_be_near_crease(const Particles& particles, Adjacency::Range neighbours, int i) {
@@ -31,19 +31,6 @@ bool is_taken(const Particles& particles, Adjacency::Range neighbours, const Vec
         return particles.normal[j].dot(normal) > 0.0 &&
                (particles.position[j] - place).squaredNorm() < distance * distance;
     });
-}
-
-/// Cosines and sines of the angles at which the surface around is looked at.
-const std::array<std::array<double, 2>, kWays>& ways_around() {
-    static const auto ways = [] {
-        std::array<std::array<double, 2>, kWays> result;
-        for (int way = 0; way < kWays; ++way) {
-            const double angle = way * (2.0 * M_PI / kWays);
-            result[way] = {std::cos(angle), std::sin(angle)};
-        }
-        return result;
-    }();
-    return ways;
 }
 
 }  // namespace
@@ -67,7 +54,7 @@ Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, 
         pull += (m.dot(to) - f.value / slope) * m;
         turned += 1.0 - m.dot(n) * m.dot(n);
     }
-    const int planes = kWays + 1;
+    const auto planes = static_cast<double>(ways_around().size() + 1);
     if (!(turned > planes * kLine)) return {};
     const Eigen::SelfAdjointEigenSolver<Mat3> spread(normals / planes);
     const Vec3& values = spread.eigenvalues();  // ascending

@@ -1,6 +1,7 @@
 // Sharp triangles made blunter, by the other diagonal or by moving a corner along the surface.
 #pragma once
 
+#include <memory>
 #include <set>
 #include <utility>
 #include <vector>
@@ -18,6 +19,8 @@ struct Blunting {
     Vec3 from = Vec3::Zero();      ///< Where it was.
 };
 
+class TriangleBoxes;
+
 /// Makes the sharp triangles of a mesh blunter. The mesh must be closed, oriented, manifold and free of
 /// crossings, and stays so; its topology does not change.
 class Blunter {
@@ -27,6 +30,7 @@ public:
     /// mesh meanwhile.
     Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
             const Surface& surface, const std::vector<const CrossingGrid*>& reached, double tolerance);
+    ~Blunter();
 
     /// Looks at the triangles with an angle below 30 degrees, sharpest first, but for those that were looked
     /// at in vain and have not changed since; so often, or until nothing changes. Flips the longest edge, or
@@ -62,6 +66,7 @@ private:
     std::vector<char> unchecked_;  // per triangle: changed since crossings were looked for
     std::vector<Blunting> changes_;
     std::set<std::pair<int, int>> lost_;  // edges that were flipped: taking that back brings them back
+    std::unique_ptr<TriangleBoxes> boxes_;
 };
 
 }  // namespace isotrack
