@@ -42,7 +42,7 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
                 });
         }
         for (const auto& group : groups)
-            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, group.size(), 64), [&](const auto& range) {
+            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, group.size(), 16), [&](const auto& range) {
                 Surface::Probe& probe = probes.local();
                 for (std::size_t g = range.begin(); g < range.end(); ++g) {
                     const int i = group[g];

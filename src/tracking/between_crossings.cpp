@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 
+#include "find_in_blocks.h"
 #include "tracking/failing.h"
 
 namespace isotrack {
@@ -59,15 +60,19 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
         crossings_.for_each_in(Box(box.min() - reach, box.max() + reach),
                                [&](std::size_t c) { at_fold[c].store(1, std::memory_order_relaxed); });
     });
-    std::vector<int> doubtful;
     looked_at_.resize(crossings_.size(), 0);
-    for (const int c : at_crossings.survey(kNearlyAtFolds * tolerance_).beyond) {
-        const double d = at_crossings[c];
-        if (looked_at_[c] || d > kCertified * tolerance_ || !(at_fold[c] || d > kNearlyTooFar * tolerance_))
-            continue;
-        looked_at_[c] = 1;
-        doubtful.push_back(c);
-    }
+    constexpr std::size_t kBlock = 32768;
+    const auto doubtful = find_in_blocks<int>(
+        crossings_.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
+            for (std::size_t c = begin; c < end; ++c) {
+                const double d = at_crossings[c];
+                if (looked_at_[c] || d > kCertified * tolerance_ ||
+                    !(d > (at_fold[c] ? kNearlyAtFolds : kNearlyTooFar) * tolerance_))
+                    continue;
+                looked_at_[c] = 1;
+                found.push_back(static_cast<int>(c));
+            }
+        });
     if (!crossings_.thinned_out(surface_)) return cells_.around(doubtful);
     std::vector<Vec3> places;
     for (const int c : doubtful) places.push_back(crossings_[c].point);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "find_in_blocks.h"
 #include "isotrack/meshing/certify.h"
 
 namespace isotrack {
@@ -21,30 +22,38 @@ void MeshDistances::measure(const std::vector<Vec3>& vertices, const std::vector
     const Survey before = survey(cutoff_);
     const double reach = before.lost > 0 ? cutoff_ : before.farthest;
     constexpr float kUnknown = -1.0f;
-    const auto for_each_near = [&](const Facet& facet, const auto& body) {
-        const auto& [a, b, c] = facet.corner;
-        const Vec3 around = Vec3::Constant(reach + same),
-                   low = a.cwiseMin(b).cwiseMin(c).cast<double>() - around,
-                   high = a.cwiseMax(b).cwiseMax(c).cast<double>() + around;
-        const FacingTriangle triangle(a.cast<double>(), b.cast<double>(), c.cast<double>());
-        points_.for_each_in(Box(low, high), [&](std::size_t i) {
-            if (distances_[i] != kUnknown) body(triangle, i);
-        });
+    constexpr std::size_t kFacetsPerBlock = 16;
+    struct Near {
+        int point;
+        float distance;  // to the facet
+    };
+    // The points within a limit of facets, which goes with the distance measured; none that are unknown.
+    const auto near = [&](const std::vector<Facet>& facets, const auto& limit_at) {
+        const auto find = [&](std::size_t begin, std::size_t end, std::vector<Near>& found) {
+            for (std::size_t f = begin; f < end; ++f) {
+                const Vec3 a = facets[f].corner[0].cast<double>(), b = facets[f].corner[1].cast<double>(),
+                           c = facets[f].corner[2].cast<double>(), around = Vec3::Constant(reach + same);
+                const FacingTriangle triangle(a, b, c);
+                const Box box(a.cwiseMin(b).cwiseMin(c) - around, a.cwiseMax(b).cwiseMax(c) + around);
+                points_.for_each_in(box, [&](std::size_t i) {
+                    const double limit = limit_at(distances_[i]), limit2 = limit * limit;
+                    if (limit < 0.0) return;
+                    const double d2 = triangle.squared_distance(points_[i], limit2);
+                    if (d2 <= limit2)
+                        found.push_back({static_cast<int>(i), static_cast<float>(std::sqrt(d2))});
+                });
+            }
+        };
+        return find_in_blocks<Near>(facets.size(), kFacetsPerBlock, find);
     };
     std::vector<int> unknown;
-    for (const Facet& facet : changes.went)
-        for_each_near(facet, [&](const FacingTriangle& triangle, std::size_t i) {
-            const double d = distances_[i] + same;
-            if (triangle.squared_distance(points_[i], d * d) > d * d) return;
-            distances_[i] = kUnknown;
-            unknown.push_back(static_cast<int>(i));
-        });
-    for (const Facet& facet : changes.came)
-        for_each_near(facet, [&](const FacingTriangle& triangle, std::size_t i) {
-            const double limit = std::min<double>(distances_[i], cutoff_),
-                         d2 = triangle.squared_distance(points_[i], limit * limit);
-            if (d2 < limit * limit) distances_[i] = static_cast<float>(std::sqrt(d2));
-        });
+    for (const Near& n : near(changes.went, [&](double d) { return d + same; })) {
+        if (distances_[n.point] == kUnknown) continue;
+        distances_[n.point] = kUnknown;
+        unknown.push_back(n.point);
+    }
+    for (const Near& n : near(changes.came, [&](double d) { return std::min(d, cutoff_); }))
+        distances_[n.point] = std::min(distances_[n.point], n.distance);
     crossing_distances(vertices, triangles, points_, unknown, cutoff_, distances_);
 }
 
