@@ -24,17 +24,18 @@ struct Extent {
 
 }  // namespace
 
-CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing)
+CrossingGrid::CrossingGrid(const Surface::CrossingSequence& crossings, double spacing)
     : spacing_(spacing), width_(2.0 * spacing) {
     constexpr double kColumnsPerCrossing = 4.0;
-    if (crossings.empty()) return;
-    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size(), 4096);
+    if (crossings.size == 0) return;
+    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, 4096);
     const Extent extent = tbb::parallel_reduce(
         range_of_all, Extent(),
         [&](const auto& range, Extent sum) {
             for (std::size_t c = range.begin(); c < range.end(); ++c) {
-                sum.box.extend(crossings[c].point);
-                sum.add(crossings[c].outward);
+                const Surface::Crossing crossing = crossings.at(c);
+                sum.box.extend(crossing.point);
+                sum.add(crossing.outward);
             }
             return sum;
         },
@@ -49,7 +50,7 @@ CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, doub
         return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
     });
     origin_ = box.min();
-    const double most = kColumnsPerCrossing * static_cast<double>(crossings.size());
+    const double most = kColumnsPerCrossing * static_cast<double>(crossings.size);
     const Vec3 size = box.sizes();
     width_ = std::max({width_, std::sqrt(size.x() * size.y() / most), size.x() / most, size.y() / most});
     for (int axis = 0; axis < 2; ++axis) count_[axis] = static_cast<int>(size[axis] / width_) + 1;
@@ -63,18 +64,19 @@ CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, doub
     std::vector<std::atomic<std::uint32_t>> next(columns);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c)
-            next[column_of(offset_of(crossings[c]))].fetch_add(1, std::memory_order_relaxed);
+            next[column_of(offset_of(crossings.at(c)))].fetch_add(1, std::memory_order_relaxed);
     });
     for (std::size_t c = 0; c < columns; ++c) {
         first_[c + 1] = first_[c] + next[c].load(std::memory_order_relaxed);
         next[c].store(0, std::memory_order_relaxed);
     }
-    entries_.resize(crossings.size());
+    entries_.resize(crossings.size);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
-            const Eigen::Vector3f offset = offset_of(crossings[c]);
+            const Surface::Crossing crossing = crossings.at(c);
+            const Eigen::Vector3f offset = offset_of(crossing);
             const std::size_t column = column_of(offset);
-            const auto direction = std::find(directions_.begin(), directions_.end(), crossings[c].outward);
+            const auto direction = std::find(directions_.begin(), directions_.end(), crossing.outward);
             entries_[first_[column] + next[column].fetch_add(1, std::memory_order_relaxed)] = {
                 offset, static_cast<std::uint32_t>(direction - directions_.begin())};
         }

@@ -547,41 +547,45 @@ int cube_within(double length, double voxel) {
     return cube;
 }
 
-/// `edge_at(i)` as a crossing, for each i below `count`.
-template <typename EdgeAt>
-std::vector<Surface::Crossing> to_crossings(std::size_t count, const EdgeAt& edge_at, const AffineMap& map) {
-    std::vector<Surface::Crossing> result(count);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 4096), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            const CrossedEdge& edge = edge_at(i);
-            const Vec3 along = map.linear.col(edge.axis).normalized();
-            result[i] = {map.to_world(edge.index()), (edge.outward ? 1.0f : -1.0f) * along.cast<float>()};
-        }
-    });
-    return result;
-}
-std::vector<Surface::Crossing> to_crossings(const std::vector<std::size_t>& some,
-                                            const std::vector<CrossedEdge>& edges, const AffineMap& map) {
-    return to_crossings(
-        some.size(), [&](std::size_t i) -> const CrossedEdge& { return edges[some[i]]; }, map);
-}
+/// Crossed edges as crossings.
+class ToCrossing {
+public:
+    explicit ToCrossing(const AffineMap& map) : map_(map) {
+        for (int axis = 0; axis < 3; ++axis) along_[axis] = map.linear.col(axis).normalized().cast<float>();
+    }
+    Surface::Crossing operator()(const CrossedEdge& edge) const {
+        return {map_.to_world(edge.index()), (edge.outward ? 1.0f : -1.0f) * along_[edge.axis]};
+    }
+
+private:
+    const AffineMap& map_;
+    Eigen::Vector3f along_[3];
+};
 
 }  // namespace
 
-std::vector<Surface::Crossing> LevelSet::crossings(double apart) const {
+Surface::CrossingSequence LevelSet::crossing_sequence(double apart) const {
     const std::vector<CrossedEdge>& edges = impl_->crossed.edges;
-    if (const int cube = cube_within(apart, resolution()); cube > 1)
-        return to_crossings(thin_out(impl_->crossed, cube), edges, impl_->map);
-    return to_crossings(
-        edges.size(), [&](std::size_t i) -> const CrossedEdge& { return edges[i]; }, impl_->map);
+    const ToCrossing crossing(impl_->map);
+    if (const int cube = cube_within(apart, resolution()); cube > 1) {
+        std::vector<std::size_t> some = thin_out(impl_->crossed, cube);
+        const std::size_t size = some.size();
+        return {size, [&edges, crossing, chosen = std::move(some)](std::size_t i) {
+                    return crossing(edges[chosen[i]]);
+                }};
+    }
+    return {edges.size(), [&edges, crossing](std::size_t i) { return crossing(edges[i]); }};
 }
 std::vector<Surface::Crossing> LevelSet::crossings_near(const std::vector<Vec3>& places, double reach) const {
     std::vector<Vec3> middles;
     for (const Vec3& place : places) middles.push_back(impl_->map.to_index(place));
     // Along any of the lattice's axes.
     const double voxels = lattice().inverse().linear().cwiseAbs().rowwise().sum().maxCoeff() * reach;
-    const auto near = edges_near(impl_->crossed, middles, voxels, cube_within(reach, resolution()));
-    return to_crossings(near, impl_->crossed.edges, impl_->map);
+    std::vector<Crossing> result;
+    const ToCrossing crossing(impl_->map);
+    for (const std::size_t e : edges_near(impl_->crossed, middles, voxels, cube_within(reach, resolution())))
+        result.push_back(crossing(impl_->crossed.edges[e]));
+    return result;
 }
 namespace {
 

@@ -1,6 +1,9 @@
 #include "isotrack/surface/surface.h"
 
+#include <tbb/parallel_for.h>
+
 #include <cmath>
+#include <utility>
 
 #include "surface/lattice_scan.h"
 
@@ -64,16 +67,26 @@ Eigen::Affine3d Surface::lattice() const {
     return result;
 }
 
-std::vector<Surface::Crossing> Surface::crossings(double) const {
+Surface::CrossingSequence Surface::crossing_sequence(double) const {
     std::vector<Crossing> result;
     const Box box = bounds();
-    if (box.isEmpty()) return result;
+    if (box.isEmpty()) return {};
     const Eigen::Affine3d from_lattice = lattice();
     scan_lattice(*probe(), from_lattice, Vec3::Zero(), nodes_across(box, resolution()),
                  [&](const Vec3& node, int axis, double fraction, bool outward) {
                      result.push_back({from_lattice * (node + fraction * Vec3::Unit(axis)),
                                        (outward ? 1.0f : -1.0f) * Eigen::Vector3f::Unit(axis)});
                  });
+    const std::size_t size = result.size();
+    return {size, [list = std::move(result)](std::size_t i) { return list[i]; }};
+}
+
+std::vector<Surface::Crossing> Surface::crossings(double apart) const {
+    const CrossingSequence sequence = crossing_sequence(apart);
+    std::vector<Crossing> result(sequence.size);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.size(), 4096), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) result[i] = sequence.at(i);
+    });
     return result;
 }
 

@@ -108,7 +108,7 @@ print_missed
 echo
 echo "Size, at about the same number of voxels between particles."
 echo
-echo "| particles | active voxels | tolerance, voxels | seconds, without read | particles per second | peak memory above the grid, bytes per particle |"
+echo "| particles | active voxels | tolerance, voxels | seconds, without read | particles per second | peak memory above the grid and the program, bytes per particle |"
 echo "|---:|---:|---:|---:|---:|---:|"
 sizes="5000 16000 50000 160000"
 [ "$large" = 0 ] || sizes="$sizes 500000"

@@ -14,11 +14,12 @@ namespace isotrack {
 /// on the crossings alone. Read-only, so threads may share it.
 class CrossingGrid {
 public:
-    /// Those of `surface.crossings(apart)`.
+    /// Those of `surface.crossing_sequence(apart)`.
     explicit CrossingGrid(const Surface& surface, double apart = 0.0)
-        : CrossingGrid(surface.crossings(apart), std::max(surface.resolution(), apart)) {}
+        : CrossingGrid(surface.crossing_sequence(apart), std::max(surface.resolution(), apart)) {}
     /// `spacing` of the crossings, world units. Few different directions, as those of a lattice.
-    CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing);
+    CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing)
+        : CrossingGrid({crossings.size(), [&](std::size_t i) { return crossings[i]; }}, spacing) {}
 
     std::size_t size() const { return entries_.size(); }
     bool empty() const { return entries_.empty(); }
@@ -68,6 +69,8 @@ public:
     std::vector<char> columns_of(const std::vector<int>& some) const;
 
 private:
+    CrossingGrid(const Surface::CrossingSequence& crossings, double spacing);
+
     /// A crossing in 16 bytes: there are more of them than of all else.
     struct Entry {
         Eigen::Vector3f offset;   // from origin_

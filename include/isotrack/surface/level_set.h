@@ -47,7 +47,7 @@ public:
     /// meets the border.
     bool at_border(const Vec3& p) const override;
     using Surface::crossings;
-    std::vector<Crossing> crossings(double apart) const override;
+    CrossingSequence crossing_sequence(double apart) const override;
     std::vector<Crossing> crossings_near(const std::vector<Vec3>& places, double reach) const override;
     std::vector<Eigen::Vector3i> upright_crossings() const override;
     std::vector<Diagonal> diagonals() const override;

@@ -1,6 +1,7 @@
 // What the method knows of a surface: a value, a gradient, and the two operators made of them.
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -88,12 +89,19 @@ public:
         Eigen::Vector3f outward;  ///< Unit direction of the edge, from its end inside to its end outside.
     };
 
+    /// Crossings that are made when they are asked for: a list of them would take more memory than all else.
+    /// Must not outlive the surface; threads may share it.
+    struct CrossingSequence {
+        std::size_t size = 0;
+        std::function<Crossing(std::size_t)> at;  ///< Below `size`.
+    };
     /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
-    /// in the same order.
-    std::vector<Crossing> crossings() const { return crossings(0.0); }
-    /// Of those within a cube of an edge up to `apart` some along one axis may stand for all: one that goes
-    /// out and one that goes in, where there are both. This default scans `bounds()` and gives all.
-    virtual std::vector<Crossing> crossings(double apart) const;
+    /// in the same order. Of those within a cube of an edge up to `apart` some along one axis may stand for
+    /// all: one that goes out and one that goes in, where there are both. This default scans `bounds()` and
+    /// gives all.
+    virtual CrossingSequence crossing_sequence(double apart) const;
+    /// A list of them.
+    std::vector<Crossing> crossings(double apart = 0.0) const;
     /// All of them in boxes around some places, `reach` to each side, and others nearby. This default, which
     /// lets none stand for others, has none.
     virtual std::vector<Crossing> crossings_near(const std::vector<Vec3>& /*places*/,
