@@ -74,7 +74,6 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     std::vector<std::pair<std::uint64_t, int>> order;
     for (std::size_t c = 0; c < grid.size(); ++c)
         if (!covered[c]) order.emplace_back(mix(seed ^ mix(c)), static_cast<int>(c));
-    tbb::parallel_sort(order.begin(), order.end());
     // Seeds are found side by side, a batch at a time; those that another of the batch covers were in vain.
     struct Seed {
         Vec3 position, normal;
@@ -95,23 +94,37 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     std::size_t added = 0;
     std::vector<int> batch;
     std::vector<Seed> seeds;
-    for (std::size_t next = 0; next < order.size();) {
-        for (batch.clear(); next < order.size() && batch.size() < kBatch; ++next)
-            if (const int c = order[next].second; !covered[c]) batch.push_back(c);
-        seeds.assign(batch.size(), {});
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, batch.size(), 8), [&](const auto& range) {
-            Surface::Probe& probe = probes.local();
-            for (std::size_t i = range.begin(); i < range.end(); ++i) seeds[i] = seed_at(batch[i], probe);
-        });
-        for (std::size_t i = 0; i < batch.size(); ++i) {
-            if (covered[batch[i]]) continue;
-            covered[batch[i]] = 1;
-            const auto& [p, n, h] = seeds[i];
-            if (!(h > 0.0)) continue;
-            particles.add(p, n, h, next_id++);
-            mark(p, n, apart * h);
-            ++added;
+    const auto sow = [&](const auto& begin, const auto& end) {
+        for (auto next = begin; next != end;) {
+            for (batch.clear(); next != end && batch.size() < kBatch; ++next)
+                if (const int c = next->second; !covered[c]) batch.push_back(c);
+            seeds.assign(batch.size(), {});
+            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, batch.size(), 8), [&](const auto& range) {
+                Surface::Probe& probe = probes.local();
+                for (std::size_t i = range.begin(); i < range.end(); ++i) seeds[i] = seed_at(batch[i], probe);
+            });
+            for (std::size_t i = 0; i < batch.size(); ++i) {
+                if (covered[batch[i]]) continue;
+                covered[batch[i]] = 1;
+                const auto& [p, n, h] = seeds[i];
+                if (!(h > 0.0)) continue;
+                particles.add(p, n, h, next_id++);
+                mark(p, n, apart * h);
+                ++added;
+            }
         }
+    };
+    // Put in order a part at a time: most of the later ones are covered by then.
+    constexpr int kParts = 16;
+    for (std::uint64_t part = 1; part <= kParts; ++part) {
+        order.erase(
+            std::remove_if(order.begin(), order.end(), [&](const auto& o) { return covered[o.second] != 0; }),
+            order.end());
+        const auto end = std::partition(order.begin(), order.end(), [&](const auto& o) {
+            return part == kParts || o.first < part * (~std::uint64_t{0} / kParts);
+        });
+        tbb::parallel_sort(order.begin(), end);
+        sow(order.begin(), end);
     }
     return added;
 }
