@@ -150,11 +150,22 @@ bool is_sound(const MeshTopology& topology) {
     return topology.closed() && topology.oriented() && topology.manifold();
 }
 
-/// Patches of one mesh, which becomes another where one is taken.
+/// What a search has tried, of all patchers that take part in it.
+struct Effort {
+    int patches = 0, refused = 0;  // those that are made, and those whose meshes are inspected in vain
+    std::size_t triangles = 0;     // of the whole meshes they make
+
+    bool is_enough() const {
+        return patches >= kMostPatches || refused >= kMostRefused || triangles > kMostTriangles;
+    }
+};
+
+/// Patches of one mesh, which becomes another where one is taken; near some places alone.
 class Patcher {
 public:
-    Patcher(MeshTrials& trials, const std::vector<Vec3>& places, const Surface& surface)
+    Patcher(MeshTrials& trials, const std::vector<Vec3>& places, const Surface& surface, Effort& effort)
         : trials_(trials),
+          effort_(effort),
           resolution_(surface.resolution()),
           lattice_(surface.lattice_mesh(places, kLatticeReach * resolution_), resolution_) {}
 
@@ -166,10 +177,6 @@ public:
         lattice_.forget();
         try_again();
     }
-    bool is_worn_out() const {
-        return patches_ == kMostPatches || refused_ == kMostRefused || triangles_ > kMostTriangles;
-    }
-
     /// Takes the patch within `reach` resolutions of a place if it is wanted by its own numbers and then by
     /// those of the whole mesh, if it crosses nothing, and if its mesh is taken: `try_mesh`. Returns whether;
     /// nullopt where it was wanted and failed.
@@ -180,17 +187,17 @@ public:
         if (!bins_) bins_.emplace(mesh.vertices, mesh.carved.triangles, 0.5 * resolution_);
         std::vector<int> gone = triangles_around(place, reach * resolution_, *bins_);
         if (tried_.count(gone) > 0) return false;
-        ++patches_;
+        ++effort_.patches;
         const auto patch = patch_for(gone, *bins_, lattice_);
         tried_.insert(std::move(gone));
         if (!patch || !is_wanted(*patch)) return false;
-        triangles_ += mesh.carved.triangles.size();
+        effort_.triangles += mesh.carved.triangles.size();
         FrameMesh other = patched(mesh, *patch);
         const MeshTopology topology = topology_of(other);
         if (!is_sound(topology) || !are_wanted(topology)) return false;
         if (has_flat_triangle(*patch, mesh) || crosses(*patch, mesh)) return std::nullopt;
         if (!try_mesh(std::move(other))) {
-            ++refused_;
+            ++effort_.refused;
             return std::nullopt;
         }
         forget();
@@ -199,17 +206,15 @@ public:
 
 private:
     MeshTrials& trials_;
+    Effort& effort_;
     const double resolution_;
     PatchSource lattice_;
     std::optional<TriangleBins> bins_;  // of the mesh as it is
     std::set<std::vector<int>> tried_;  // triangles of it that went
-    int patches_ = 0, refused_ = 0;
-    std::size_t triangles_ = 0;  // of whole meshes
 };
 
-}  // namespace
-
-std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface) {
+std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface,
+                           Effort& effort) {
     const double resolution = surface.resolution();
     std::vector<Vec3> places =
         suspicious_places(trials.mesh(), trials.inspection().topology, thickness, resolution);
@@ -234,7 +239,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         some->insert(some->end(), unmatched.begin(), unmatched.end());
         if (some->size() > kMostPlaces) some->resize(kMostPlaces);
     }
-    auto patcher = std::make_unique<Patcher>(trials, places, surface);
+    auto patcher = std::make_unique<Patcher>(trials, places, surface, effort);
     std::size_t count = 0;
     std::set<std::array<double, 3>> around;  // vertices where a patch would be right, but did not fit
     const auto patch_at = [&](const Vec3& place, double reach, long most) {
@@ -254,7 +259,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const auto patch_near = [&](const std::vector<Vec3>& some, long worse) {
         for (const double reach : kReaches)
             for (const Vec3& place : some)
-                if (now > 0 && !patcher->is_worn_out()) patch_at(place, reach, now + worse);
+                if (now > 0 && !effort.is_enough()) patch_at(place, reach, now + worse);
         patcher->try_again();
     };
     const auto search = [&](const std::vector<Vec3>& some) {
@@ -268,19 +273,38 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     };
     search(likely);
     search(places);
-    if (now == 0 || patcher->is_worn_out()) return count;
+    if (now == 0 || effort.is_enough()) return count;
     std::vector<Vec3> others = other_places(trials.mesh(), surface);
     if (others.size() > kMostPlaces) others.resize(kMostPlaces);
-    patcher = std::make_unique<Patcher>(trials, others, surface);
+    patcher = std::make_unique<Patcher>(trials, others, surface, effort);
+    around.clear();
     search(others);
     return count;
 }
 
+}  // namespace
+
+std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface) {
+    Effort effort;
+    return patch_topology(trials, thickness, surface, effort);
+}
+
 std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface) {
     const double resolution = surface.resolution();
-    std::vector<Vec3> failing = trials.failing_places(), places = apart(failing, kApart * resolution), around;
+    std::vector<Vec3> places = apart(trials.failing_places(), kApart * resolution), around;
     if (places.empty()) return 0;
     if (places.size() > kMostFailing) places.resize(kMostFailing);
+    const auto is_near = [&](const Vec3& place, double distance) {
+        return std::any_of(places.begin(), places.end(),
+                           [&](const Vec3& other) { return (other - place).norm() < distance * resolution; });
+    };
+    std::vector<Vec3> failing;  // that is looked at
+    const auto look = [&] {
+        failing.clear();
+        for (const Vec3& place : trials.failing_places())
+            if (is_near(place, 2.0 * kAround)) failing.push_back(place);
+    };
+    look();
     const auto fails_near = [&](const Vec3& place, double distance) {
         return std::any_of(failing.begin(), failing.end(),
                            [&](const Vec3& other) { return (other - place).norm() < distance * resolution; });
@@ -289,7 +313,8 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
     const auto has_same_numbers = [&](const MeshTopology& other) {
         return other.components == topology.components && other.euler == topology.euler;
     };
-    Patcher patcher(trials, places, surface);
+    Effort effort;
+    Patcher patcher(trials, places, surface, effort);
     std::size_t count = 0;
     const auto patch_at = [&](const Vec3& place, double reach, const auto& are_wanted) {
         return patcher
@@ -303,18 +328,21 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
     const auto patch_twice = [&](const Vec3& place, double reach) {
         FrameMesh before = trials.mesh();
         if (!patch_at(place, reach, [](const MeshTopology&) { return true; })) return false;
-        patch_topology(trials, thickness, surface);
+        patch_topology(trials, thickness, surface, effort);
         const bool good = has_same_numbers(topology_of(trials.mesh()));
-        if (!good) trials.put_back(std::move(before));
+        if (!good) {
+            trials.put_back(std::move(before));
+            ++effort.refused;
+        }
         patcher.forget();
         return good;
     };
     const auto patch_near = [&](const std::vector<Vec3>& some, double distance, const auto& patch) {
         for (const double reach : kReaches)
             for (const Vec3& place : some) {
-                if (patcher.is_worn_out() || !fails_near(place, distance)) continue;
-                count += patch(place, reach);
-                failing = trials.failing_places();
+                if (effort.is_enough() || !fails_near(place, distance) || !patch(place, reach)) continue;
+                ++count;
+                look();
             }
         patcher.try_again();
     };
@@ -323,7 +351,7 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
     };
     patch_near(places, kApart, patch_alone);
     for (const Vec3& v : trials.mesh().vertices)
-        if (fails_near(v, kAround)) around.push_back(v);
+        if (is_near(v, kAround) && fails_near(v, kAround)) around.push_back(v);
     patch_near(around, kAround, patch_alone);
     patch_near(places, kApart, patch_twice);
     return count;
