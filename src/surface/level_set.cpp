@@ -243,10 +243,14 @@ Slope slope_at_surface(const FloatTree& tree, const AffineMap& map,
             if (std::isfinite(slope) && slope > 0.0) slopes.push_back(slope);
         }
     if (slopes.empty()) return {};
-    const double sum = std::accumulate(slopes.begin(), slopes.end(), 0.0);
+    constexpr double kSteepest = 2.0;  // medians: next to a value that was not finite it may be anything
     const auto middle = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2);
     std::nth_element(slopes.begin(), middle, slopes.end());
-    return {*middle, sum / static_cast<double>(slopes.size())};
+    const double median = *middle;
+    const double sum = std::accumulate(slopes.begin(), slopes.end(), 0.0, [=](double so_far, double slope) {
+        return so_far + std::min(slope, kSteepest * median);
+    });
+    return {median, sum / static_cast<double>(slopes.size())};
 }
 
 /// World units per grid unit for a measured slope: exact where the unit is recognised.

@@ -326,6 +326,7 @@ public:
     std::unique_ptr<Probe> probe() const override { return std::make_unique<MovedProbe>(*this); }
     double resolution() const override { return solid_->resolution(); }
     double reach() const override { return solid_->reach(); }
+    double slope() const override { return solid_->slope(); }
     Box bounds() const override {
         const Box inner = solid_->bounds();
         Box outer;
@@ -383,6 +384,11 @@ public:
         double reach = parts_.front()->reach();
         for (const SurfacePtr& part : parts_) reach = std::min(reach, part->reach());
         return reach;
+    }
+    double slope() const override {
+        double slope = 1.0;
+        for (const SurfacePtr& part : parts_) slope = std::min(slope, part->slope());
+        return slope;
     }
     Box bounds() const override {
         Box box;

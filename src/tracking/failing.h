@@ -10,16 +10,16 @@
 namespace isotrack {
 
 constexpr double kSuspect = 0.6;  // of the tolerance: above it a triangle's largest error is searched for
-// Of the tolerance: so that samples at other places find it kept, too, and those who divide values by the
-// mean slope of a level set, which is 0.976 of one made of a mesh. Where it is less the tolerance is.
+constexpr double kCertified = 0.97;  // of the tolerance: samples at other places find it kept, too
+// The mean slope of a level set made of a mesh is 0.976: values over it still keep the tolerance. Where the
+// slope is less values are held to less.
 constexpr double kFullSlope = 0.975;
-constexpr double kCertified = 0.97;
 
 inline bool is_too_far(const TriangleError& error, double tolerance) {
     return error.largest > kCertified * tolerance;
 }
 inline bool is_turned(const TriangleError& error) {
-    return error.turned_deg > kMostTurned;
+    return error.turned_deg > kMostTurnedDeg;
 }
 
 /// Whether the angles of a triangle between particles matter: on smooth surface, and not tiny.

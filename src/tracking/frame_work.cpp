@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "isotrack/meshing/blunting.h"
+#include "tracking/failing.h"
 #include "tracking/refitted.h"
 #include "tracking/stage_timer.h"
 
@@ -65,7 +66,7 @@ void FrameWork::blunt() {
         }
         std::vector<Vec3> places;
         for (const Blunting& change : blunter.changes()) {
-            double limit = limits.tolerance;
+            double limit = kCertified * limits.tolerance;
             for (const int t : change.triangle) limit = std::max(limit, (*errors_before)[t].largest);
             for (const int t : change.triangle)
                 if (const TriangleError& error = (*inspection.errors)[t]; error.largest > limit)

@@ -11,7 +11,7 @@ namespace isotrack {
 
 /// World units and radians; all > 0.
 struct SizingLimits {
-    double tolerance;           ///< Largest distance between mesh and surface.
+    double tolerance;           ///< Of values at the mesh: less than of distances where the slope is.
     double angle;               ///< Largest angle between the normals of neighbours.
     double min_edge, max_edge;  ///< The spacing stays between these.
     double angle_floor =

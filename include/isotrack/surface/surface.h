@@ -69,8 +69,8 @@ public:
     /// Half width of the band in which values are distances, world units.
     virtual double reach() const { return std::numeric_limits<double>::infinity(); }
 
-    /// Mean length of the gradient at the surface, 1 at most: less where values are interpolated around what
-    /// is a few resolutions small. Distances near the surface are the values over it.
+    /// Mean length of the gradient at the surface, in (0, 1]: less than 1 where values are interpolated around
+    /// what is a few resolutions small. Distances near the surface are the values over it.
     virtual double slope() const { return 1.0; }
 
     /// A box that holds the surface; empty when there is none.
