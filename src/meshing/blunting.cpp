@@ -90,7 +90,7 @@ bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replac
     const auto passes = [&](const Triangle& t) {
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
         const TriangleError error = certified_error(a, b, c, probe, resolution, 0.5 * tolerance);
-        return error.largest <= tolerance && error.turned_deg <= kMostTurned;
+        return error.largest <= tolerance && error.turned_deg <= kMostTurnedDeg;
     };
     return std::all_of(candidates.begin(), candidates.end(), passes) && reach_what(before, candidates);
 }

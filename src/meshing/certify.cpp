@@ -95,13 +95,12 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
 double facing(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
     const Vec3 normal = (b - a).cross(c - a).normalized();
     double most = normal.dot(probe.normal((a + b + c) / 3.0));
-    for (const Vec3* corner : {&a, &b, &c})
-        if (most < kFacing) most = std::max(most, normal.dot(probe.normal(*corner)));
+    if (most >= kFacing) return most;
+    for (const Vec3* corner : {&a, &b, &c}) most = std::max(most, normal.dot(probe.normal(*corner)));
     return most;
 }
 
-double normal_deviation(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
-                        double resolution) {
+double turned_deg(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, double resolution) {
     constexpr double kLeastHeight = 0.5;  // resolutions
     constexpr double kLeastSlope = 0.6;
     constexpr double kDegrees = 57.29577951308232;
@@ -127,7 +126,7 @@ TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfa
         const TriangleError again = triangle_error(a, b, c, probe, kMostSteps, refine_above);
         if (again.largest > error.largest) error = again;
     }
-    error.turned_deg = normal_deviation(a, b, c, probe, resolution);
+    error.turned_deg = turned_deg(a, b, c, probe, resolution);
     return error;
 }
 

@@ -50,8 +50,8 @@ private:
 std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh);
 
 /// `gone`, with a border that is pinched nowhere, goes. The triangles of `source` that are nearest to them
-/// come, less a seam about as wide as its spacing; strips of triangles that face as the source does fill the
-/// seam from each loop of the one border to one of the other, and what they cross of what comes is left out.
+/// come, less a seam about as wide as its spacing; strips of triangles that face as the source does, if any do, fill
+/// the seam from each loop of the one border to one of the other, and what they cross of what comes is left out.
 /// nullopt where the loops do not match. The mesh must be closed and manifold, and so is what it becomes, but
 /// for edges that it may have twice; it may cross itself.
 std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source);

@@ -8,6 +8,8 @@
 #include <iterator>
 #include <utility>
 
+#include "meshing/triangle_box.h"
+
 namespace isotrack {
 namespace {
 
@@ -28,11 +30,7 @@ struct TriangleBoxes::Impl {
     const std::vector<Triangle>& triangles;
     Tree tree;
 
-    Box box_of(int triangle) const {
-        const auto& [i, j, k] = triangles[triangle];
-        return Box(points[i].cwiseMin(points[j]).cwiseMin(points[k]),
-                   points[i].cwiseMax(points[j]).cwiseMax(points[k]));
-    }
+    Box box(int triangle) const { return box_of(points, triangles[triangle]); }
 };
 
 TriangleBoxes::TriangleBoxes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles)
@@ -40,14 +38,14 @@ TriangleBoxes::TriangleBoxes(const std::vector<Vec3>& points, const std::vector<
     std::vector<Entry> entries;
     entries.reserve(triangles.size());
     for (std::size_t t = 0; t < triangles.size(); ++t)
-        entries.emplace_back(to_tree(impl_->box_of(static_cast<int>(t))), static_cast<int>(t));
+        entries.emplace_back(to_tree(impl_->box(static_cast<int>(t))), static_cast<int>(t));
     impl_->tree = Tree(entries.begin(), entries.end());
 }
 
 TriangleBoxes::~TriangleBoxes() = default;
 
 void TriangleBoxes::note(int changed_triangle) {
-    impl_->tree.insert({to_tree(impl_->box_of(changed_triangle)), changed_triangle});
+    impl_->tree.insert({to_tree(impl_->box(changed_triangle)), changed_triangle});
 }
 
 std::vector<int> TriangleBoxes::meeting(const Box& box) const {
@@ -57,9 +55,9 @@ std::vector<int> TriangleBoxes::meeting(const Box& box) const {
     for (const Entry& entry : found) result.push_back(entry.second);
     std::sort(result.begin(), result.end());
     result.erase(std::unique(result.begin(), result.end()), result.end());
-    result.erase(std::remove_if(result.begin(), result.end(),
-                                [&](int t) { return !impl_->box_of(t).intersects(box); }),
-                 result.end());
+    result.erase(
+        std::remove_if(result.begin(), result.end(), [&](int t) { return !impl_->box(t).intersects(box); }),
+        result.end());
     return result;
 }
 

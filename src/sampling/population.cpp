@@ -221,7 +221,7 @@ int Densifier::add_or_nearest(const Vec3& place, double h) {
             least = d2;
             nearest = i;
         });
-        if (reach >= far) break;
+        if (!(reach < far)) break;
     }
     const double distance = std::sqrt(least);
     if (taken) return kTaken;

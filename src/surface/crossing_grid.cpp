@@ -24,7 +24,7 @@ struct Extent {
 
 }  // namespace
 
-CrossingGrid::CrossingGrid(const Surface::CrossingSequence& crossings, double spacing)
+CrossingGrid::CrossingGrid(double spacing, const Surface::CrossingSequence& crossings)
     : spacing_(spacing), width_(2.0 * spacing) {
     constexpr double kColumnsPerCrossing = 4.0;
     if (crossings.size == 0) return;

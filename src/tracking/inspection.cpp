@@ -361,7 +361,7 @@ void report(const FrameMesh& mesh, const Inspection& inspection, const Surface& 
     frame.rms_error =
         std::sqrt(std::max(weight > 0.0 ? sum / weight : 0.0, inspection.crossings_mean_square));
     frame.within_tolerance = frame.max_error <= frame.tolerance && frame.lost_crossings == 0 &&
-                             frame.most_turned_deg < kTurnedOver;
+                             frame.most_turned_deg < kTurnedOverDeg;
 }
 
 }  // namespace isotrack

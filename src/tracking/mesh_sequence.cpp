@@ -202,7 +202,7 @@ void describe(const TrackedFrame& tracked, const LevelSet& level_set, FrameRepor
         if (tracked.lost_crossings > 0)
             row.message += "; " + std::to_string(tracked.lost_crossings) +
                            " grid edges cross surface that the mesh lost";
-        if (tracked.most_turned_deg >= kTurnedOver) row.message += "; a triangle is turned over";
+        if (tracked.most_turned_deg >= kTurnedOverDeg) row.message += "; a triangle is turned over";
     }
 }
 

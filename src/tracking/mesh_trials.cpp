@@ -21,7 +21,7 @@ std::vector<Vec3> failing_in(const Inspection& inspection, double tolerance) {
         if (is_too_far(error, tolerance)) result.push_back(error.where);
     for (const Surface::Crossing& missed : inspection.missed) result.push_back(missed.point);
     for (const TriangleError& error : *inspection.errors)
-        if (error.turned_deg >= kTurnedOver) result.push_back(error.where);
+        if (error.turned_deg >= kTurnedOverDeg) result.push_back(error.where);
     return result;
 }
 

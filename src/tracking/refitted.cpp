@@ -9,6 +9,7 @@
 #include "isotrack/meshing/refit.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "meshing/sharpness.h"
+#include "meshing/triangle_box.h"
 #include "surface/float_precision.h"
 
 namespace isotrack {
@@ -61,14 +62,9 @@ public:
         return inspector.newly_missed(now, vertices_, triangles_);
     }
     bool is_near(std::size_t t, const Vec3& place) const {
-        const auto box = [&](const std::vector<Vec3>& points, const Triangle& triangle) {
-            Box result(points[triangle[0]]);
-            for (const int v : triangle) result.extend(points[v]);
-            return result;
-        };
         const double reach = kReach * tolerance_;
-        return box(mesh_.vertices, mesh_.carved.triangles[t]).exteriorDistance(place) <= reach ||
-               box(vertices_, triangles_[t]).exteriorDistance(place) <= reach;
+        return box_of(mesh_.vertices, mesh_.carved.triangles[t]).exteriorDistance(place) <= reach ||
+               box_of(vertices_, triangles_[t]).exteriorDistance(place) <= reach;
     }
 
     /// Takes back what is around these triangles; where nothing is, a ring farther; all, where there is
@@ -154,11 +150,12 @@ Inspection refit_within(FrameMesh& mesh, const Inspection& before, const std::ve
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bad.size(), 1024), [&](const auto& range) {
             for (std::size_t t = range.begin(); t < range.end(); ++t) {
                 const TriangleError &now = (*inspection.errors)[t], &then = (*before.errors)[t];
-                bad[t] = refitted.is_changed(t) &&
-                         (now.largest > std::max(tolerance, then.largest) ||
-                          now.turned_deg > std::max(kMostTurned, then.turned_deg) || refitted.is_spoilt(t) ||
-                          std::any_of(missed.begin(), missed.end(),
-                                      [&](const auto& c) { return refitted.is_near(t, c.point); }));
+                bad[t] =
+                    refitted.is_changed(t) &&
+                    (now.largest > std::max(tolerance, then.largest) ||
+                     now.turned_deg > std::max(kMostTurnedDeg, then.turned_deg) || refitted.is_spoilt(t) ||
+                     std::any_of(missed.begin(), missed.end(),
+                                 [&](const auto& c) { return refitted.is_near(t, c.point); }));
             }
         });
         for (const auto& [t, u] : self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}))

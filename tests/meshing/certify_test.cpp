@@ -62,15 +62,15 @@ std::array<Vec3, 3> turned(double degrees, double size) {
 
 double deviation(const std::array<Vec3, 3>& t, const std::function<double(const Vec3&)>& value) {
     const auto surface = shapes::from_function(value, Box(Vec3(-9, -9, -9), Vec3(9, 9, 9)), 1.0);
-    return normal_deviation(t[0], t[1], t[2], *surface->probe(), surface->resolution());
+    return turned_deg(t[0], t[1], t[2], *surface->probe(), surface->resolution());
 }
 
-TEST(NormalDeviation, IsTheAngleToAPlane) {
+TEST(TurnedTriangle, IsTheAngleToAPlane) {
     for (const double degrees : {0.0, 20.0, 59.0, 75.0, 120.0, 180.0})
         EXPECT_NEAR(deviation(turned(degrees, 3.0), [](const Vec3& p) { return p.z(); }), degrees, 0.01);
 }
 
-TEST(NormalDeviation, IsThatToEitherSideOfACrease) {
+TEST(TurnedTriangle, IsThatToEitherSideOfACrease) {
     const auto roof = [](const Vec3& p) { return std::max(p.x(), p.z()); };
     // On the side that looks along x, with a tip beyond the crease that takes the centroid across.
     const std::array<Vec3, 3> tip = {Vec3(-0.2, 0, -0.3), Vec3(-0.2, 1.5, -0.3), Vec3(-0.2, 0.7, 0.7)};
@@ -82,7 +82,19 @@ TEST(NormalDeviation, IsThatToEitherSideOfACrease) {
     EXPECT_NEAR(deviation({tip[0], tip[2], tip[1]}, roof), 90.0, 0.01);
 }
 
-TEST(NormalDeviation, SaysNothingOfWhatIsSmallOrHasNoNormal) {
+TEST(TurnedTriangle, IsThatToTheCornerThatFacesBestWhicheverComesFirst) {
+    // Normals point away from the y axis: by these angles from the triangle's at its corners, 68 degrees at
+    // the centroid.
+    const auto at = [](double degrees, double y) {
+        return Vec3(std::tan(degrees * 3.14159265358979323846 / 180.0), y, 1.0);
+    };
+    const auto off_axis = [](const Vec3& p) { return std::hypot(p.x(), p.z()) - 1.0; };
+    const Vec3 a = at(57.0, 0.0), b = at(80.0, 0.0), c = at(8.0, 3.0);
+    for (const auto& corners : {std::array<Vec3, 3>{a, b, c}, {b, c, a}, {c, a, b}})
+        EXPECT_NEAR(deviation(corners, off_axis), 8.0, 0.01);
+}
+
+TEST(TurnedTriangle, SaysNothingOfWhatIsSmallOrHasNoNormal) {
     const auto plane = [](const Vec3& p) { return p.z(); };
     EXPECT_GT(deviation(turned(120.0, 0.6), plane), 0.0);  // 0.54 high
     EXPECT_EQ(deviation(turned(120.0, 0.5), plane), 0.0);

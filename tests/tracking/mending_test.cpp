@@ -526,7 +526,7 @@ TEST(Patches, MendWhatIsTurnedOver) {
     frame.tolerance = 0.5;
     report(mesh, now.inspection, surface, frame);
     EXPECT_LE(frame.max_error, 0.5);
-    EXPECT_GE(frame.most_turned_deg, kTurnedOver);
+    EXPECT_GE(frame.most_turned_deg, kTurnedOverDeg);
     EXPECT_FALSE(frame.within_tolerance);
 
     EXPECT_GT(patch_failing(now.trials, std::vector<double>(carved.particles.size(), 9.0), surface), 0u);

@@ -16,7 +16,7 @@ struct TriangleError {
     double largest = 0.0;  ///< Of |farther value| at the sample points.
     double mean_square = 0.0;
     Vec3 where = Vec3::Zero();  ///< The sample point with the largest.
-    double turned_deg = 0.0;    ///< `normal_deviation`, where it is asked for.
+    double turned_deg = 0.0;    ///< `turned_deg`, where it is asked for.
 };
 
 /// The error of triangle abc at the points of a regular barycentric lattice with `steps` intervals per edge
@@ -25,14 +25,14 @@ struct TriangleError {
 TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
                              double refine_above = std::numeric_limits<double>::infinity());
 
-/// Degrees, and its cosine: a triangle whose normal is farther from those of the surface is turned.
-constexpr double kMostTurned = 60.0, kFacing = 0.5;
+/// A triangle whose normal is farther from those of the surface is turned; and the cosine of that angle.
+constexpr double kMostTurnedDeg = 60.0, kFacing = 0.5;
 /// The cosine between the normal of triangle abc and O2 at its centroid; where that is below kFacing, the
 /// largest of it and those at the corners: a triangle across a crease may face as one of the sides does.
 double facing(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe);
 /// That as an angle in degrees; 0 where it says nothing: on triangles less than half a `resolution` high, and
 /// where the gradient at the centroid is shorter than 0.6, inside of what is thinner than two voxels.
-double normal_deviation(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
+double turned_deg(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
                         double resolution);
 
 /// The intervals per edge that show the error of triangle abc: one per resolution of the surface on its

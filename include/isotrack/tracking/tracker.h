@@ -62,7 +62,7 @@ double effective_tolerance(const TrackerOptions& options, const Surface& surface
 SizingLimits sizing_limits(const TrackerOptions& options, const Surface& surface);
 
 /// Degrees: a mesh with a triangle that is turned from the surface by as much or more is not certified.
-constexpr double kTurnedOver = 90.0;
+constexpr double kTurnedOverDeg = 90.0;
 
 /// What became of one frame.
 struct TrackedFrame {
@@ -82,10 +82,10 @@ struct TrackedFrame {
     /// tolerances stand for one another; where they are so far apart anyway also at points between those that
     /// are nearly too far off, at folds of the mesh, or in cells with an ambiguous face, but for points that
     /// no vertex on the surface reaches), measured on `mesh`, world units; RMS likewise, but for the points
-    /// between. What is farther than three tolerances from any triangle that faces its way is counted as lost
-    /// instead.
+    /// between. What is farther than about three tolerances from any triangle that faces its way is counted
+    /// as lost instead.
     double max_error = 0.0, rms_error = 0.0;
-    /// The largest angle between a triangle and the surface, by `normal_deviation`: where it is above 60
+    /// The largest angle between a triangle and the surface, by `turned_deg`: where it is above 60
     /// degrees certify adds particles.
     double most_turned_deg = 0.0;
     bool opened = false;             ///< A cap was left out: the mesh has a border there.
