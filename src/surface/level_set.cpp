@@ -243,7 +243,7 @@ Slope slope_at_surface(const FloatTree& tree, const AffineMap& map,
             if (std::isfinite(slope) && slope > 0.0) slopes.push_back(slope);
         }
     if (slopes.empty()) return {};
-    constexpr double kSteepest = 2.0;  // medians: next to a value that was not finite it may be anything
+    constexpr double kSteepest = 10.0;  // medians: next to a value that was not finite it may be anything
     const auto middle = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2);
     std::nth_element(slopes.begin(), middle, slopes.end());
     const double median = *middle;
