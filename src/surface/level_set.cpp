@@ -13,7 +13,6 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
-#include <numeric>
 
 #include "component_boxes.h"
 #include "find_in_blocks.h"
@@ -244,12 +243,12 @@ Slope slope_at_surface(const FloatTree& tree, const AffineMap& map,
         }
     if (slopes.empty()) return {};
     constexpr double kSteepest = 10.0;  // medians: next to a value that was not finite it may be anything
-    const auto middle = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2);
-    std::nth_element(slopes.begin(), middle, slopes.end());
+    std::vector<double> ranked = slopes;
+    const auto middle = ranked.begin() + static_cast<std::ptrdiff_t>(ranked.size() / 2);
+    std::nth_element(ranked.begin(), middle, ranked.end());
     const double median = *middle;
-    const double sum = std::accumulate(slopes.begin(), slopes.end(), 0.0, [=](double so_far, double slope) {
-        return so_far + std::min(slope, kSteepest * median);
-    });
+    double sum = 0.0;
+    for (const double slope : slopes) sum += std::min(slope, kSteepest * median);
     return {median, sum / static_cast<double>(slopes.size())};
 }
 
