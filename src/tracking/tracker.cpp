@@ -235,7 +235,8 @@ struct Tracker::Impl {
             if (count[i] > 0) particles.velocity[i] /= count[i];
     }
 
-    void follow(const Surface& surface, const SizingLimits& l, const Pace& pace, TrackedFrame& frame);
+    void follow(const Surface& surface, const SizingLimits& l, const Pace& pace, bool warm,
+                TrackedFrame& frame);
     void make_room(const Surface& surface, TrackedFrame& frame);
     void measure(const Surface& surface, TrackedFrame& frame);
     void seed(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, double apart,
@@ -285,7 +286,7 @@ void Tracker::Impl::sample(const Surface& surface, const CrossingGrid& crossings
     const int rounds = dense ? kDenseRounds : kRounds;
     for (int round = 0; round < rounds; ++round) {
         if (round > 0) measure(surface, frame);
-        follow(surface, l, dense ? kDenseAtFirst : kAtFirst, frame);
+        follow(surface, l, dense ? kDenseAtFirst : kAtFirst, warm, frame);
         if (!warm) arrange();
     }
 }
@@ -300,7 +301,7 @@ void Tracker::Impl::make_room(const Surface& surface, TrackedFrame& frame) {
 }
 
 /// Spacing, births and deaths, then sweeps, by what the last mesh knows: no DT is needed.
-void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const Pace& pace,
+void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const Pace& pace, bool warm,
                            TrackedFrame& frame) {
     {
         const StageTimer timer(frame.seconds, "size");
@@ -311,7 +312,7 @@ void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const 
     }
     const StageTimer timer(frame.seconds, "relax");
     PopulationBand band = pace.band;
-    if (static_cast<double>(frame.lost) > kManyLost * static_cast<double>(particles.size()))
+    if (warm && static_cast<double>(frame.lost) > kManyLost * static_cast<double>(particles.size()))
         band.deaths = kDeathsThen;
     auto keep = uncrowded(particles, last_mesh.ring, band);
     const std::vector<Triangle> parents =
@@ -351,17 +352,18 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     frame.delaunay_strategy = name_of(strategy());
     const std::size_t relocated = dt->profile().relocated;
     const std::size_t before = particles.size();
-    const bool warm = !particles.empty(), as_in_paper = options.method == Method::Paper;
+    const bool as_in_paper = options.method == Method::Paper;
     const double apart = as_in_paper ? kDenseSeeds : kSparseSeeds;
     const Id first_new = next_id;
     {
         const StageTimer timer(seconds, "carry");
-        if (warm && astray()) arrange();
+        if (astray()) arrange();
         const std::vector<char> found = carry(particles, surface, motion);
         particles.retain(found);
         last_mesh.retain(found);
         frame.lost = static_cast<std::size_t>(std::count(found.begin(), found.end(), 0));
     }
+    const bool warm = !particles.empty();  // where all are lost as well, the surface is met anew
     {
         const StageTimer timer(seconds, "cover");
         work->crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
@@ -371,7 +373,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     if (as_in_paper)
         sample_as_in_paper(surface, l, warm, frame);
     else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))
-        follow(surface, l, kFollowing, frame);
+        follow(surface, l, kFollowing, warm, frame);
     else
         sample(surface, *work->crossings, l, warm, frame);
     Fitted fitted;

@@ -170,6 +170,27 @@ TEST(Tracker, FindsWhatIsBornAndDropsWhatDies) {
     EXPECT_GT(died.died, 0u);
 }
 
+TEST(Tracker, MeetsAnewWhatHasGoneFartherThanItsParticlesCanFollow) {
+    for (const bool fit : {false, true}) {
+        TrackerOptions options = with_tolerance(0.01);
+        options.fit = fit;
+        Tracker follows(options), fresh(options);
+        const auto box_at = [](double x) {
+            return LevelSet(rasterise(*shapes::box({x, 0, 0}, {0.9, 0.6, 0.5}, kVoxel), kVoxel));
+        };
+        const LevelSet here = box_at(0), there = box_at(20);
+        const std::size_t before = follows.advance(here).particles;
+        const TrackedFrame frame = follows.advance(there);
+        expect_sound(frame, 1, 2, fit ? "fitted" : "plain");
+        EXPECT_EQ(frame.lost, before);
+        EXPECT_EQ(frame.died, before);
+        EXPECT_EQ(frame.born, frame.particles);
+        const TrackedFrame first = fresh.advance(there);
+        EXPECT_EQ(frame.mesh.points, first.mesh.points);
+        EXPECT_EQ(frame.mesh.triangles, first.mesh.triangles);
+    }
+}
+
 TEST(Tracker, KeepsTheVoidOfAGrowingShell) {
     Tracker tracker(with_tolerance(0.01));
     for (int f = 0; f < 4; ++f) {
