@@ -35,6 +35,7 @@ constexpr double kFewNodes = 0.25;         // of the active ones
 constexpr double kProjectionError = 1e-4;  // voxels; float values carry no more
 constexpr double kFarVoxels = 10.0;        // values are clamped to this many voxels
 constexpr int kCapLayers = 4;              // voxels added beyond a block whose border cuts the surface
+constexpr double kMostCut = 0.6;           // of the crossings, by the end of the band: shreds otherwise
 constexpr int kLeafDim = Leaf::DIM;
 
 Vec3 to_eigen(const openvdb::Vec3d& v) {
@@ -365,6 +366,7 @@ struct LevelSet::Impl {
                 grid_label(*source) + " is not a level set: its values do not change sign around " +
                 std::to_string(options.iso) + " (class '" + openvdb::GridBase::gridClassToString(grid_class) +
                 "'); give an iso value inside its range");
+        refuse_beyond_band(options.iso, found);
         const Slope in_grid_units = slope_at_surface(grid->constTree(), map, found.edges);
         scale = value_scale_for(in_grid_units.median, map.voxel_size, grid_class == openvdb::GRID_LEVEL_SET);
         if (in_grid_units.mean > 0.0) slope = std::min(1.0, scale * in_grid_units.mean);
@@ -387,6 +389,19 @@ struct LevelSet::Impl {
                 return box;
             },
             [](const Box& a, const Box& b) { return a.merged(b); });
+    }
+
+    /// \throws InputError where the band ends before the iso value: the surface would be the band's.
+    void refuse_beyond_band(double iso, const CrossedEdges& found) const {
+        if (iso == 0.0 || active_voxels == 0 || source->getGridClass() != openvdb::GRID_LEVEL_SET) return;
+        const double end = grid->background() + iso;
+        const auto cut = std::count_if(found.edges.begin(), found.edges.end(),
+                                       [](const CrossedEdge& edge) { return edge.at_border; });
+        if ((end > 0.0 && std::abs(iso) >= end) ||
+            static_cast<double>(cut) > kMostCut * static_cast<double>(found.edges.size()))
+            throw InputError(grid_label(*source) + " has no room in its band for the iso value " +
+                             std::to_string(iso) + ": the background is " + std::to_string(end) +
+                             "; give one nearer to 0, or make the band wider");
     }
 
     bool is_active(const Coord& c) const {

@@ -5,7 +5,6 @@
 #include <openvdb/io/Stream.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/LevelSetSphere.h>
-#include <openvdb/tools/LevelSetUtil.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include <algorithm>
@@ -22,10 +21,12 @@
 #include "isotrack/io/vdb_file.h"
 #include "isotrack/surface/rasterise.h"
 #include "isotrack/surface/shapes.h"
+#include "support/unit_sphere.h"
 
 namespace isotrack {
 namespace {
 
+using support::near_sphere;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
@@ -56,19 +57,6 @@ typename GridType::Ptr sphere_grid(const openvdb::math::Transform::Ptr& transfor
 
 openvdb::math::Transform::Ptr uniform(double voxel) {
     return openvdb::math::Transform::createLinearTransform(voxel);
-}
-
-/// Random directions on the unit sphere times (1 + offset).
-std::vector<Vec3> near_sphere(std::size_t count, double offset, unsigned seed = 1) {
-    std::mt19937 random(seed);
-    std::normal_distribution<double> normal;
-    std::uniform_real_distribution<double> shift(-offset, offset);
-    std::vector<Vec3> points;
-    while (points.size() < count) {
-        const Vec3 n = Vec3(normal(random), normal(random), normal(random)).normalized();
-        points.push_back((1.0 + shift(random)) * n);
-    }
-    return points;
 }
 
 /// Holds a level set against the unit sphere. `h`: the longest voxel edge. A trilinear interpolant of a
@@ -353,48 +341,6 @@ TEST(LevelSet, ReadsHalfFloatsFromAFile) {
         EXPECT_LT((probe->sample(p).gradient - p.normalized()).norm(), 2 * h * h + 3e-3);
     }
     EXPECT_EQ(level_set.value_scale(), 1.0);
-}
-
-TEST(LevelSet, PutsTheSurfaceAtTheIsoValue) {
-    const auto grid = sphere_grid<openvdb::FloatGrid>(uniform(0.05), 0.4);
-    for (const double iso : {-0.15, 0.1, 0.2}) {
-        LevelSetOptions options;
-        options.iso = iso;
-        const LevelSet level_set(grid, options);
-        const auto probe = level_set.probe();
-        for (const Vec3& direction : near_sphere(300, 0.0)) {
-            const Vec3 p = (1.0 + iso) * direction;
-            EXPECT_NEAR(probe->value(p), 0.0, 0.5 * 0.05 * 0.05);
-            EXPECT_NEAR(probe->value(p + 0.03 * direction), 0.03, 0.5 * 0.05 * 0.05);
-        }
-        EXPECT_LT(probe->value(Vec3::Zero()), 0.0);
-        EXPECT_GT(probe->value({5, 0, 0}), 0.0);
-    }
-}
-
-TEST(LevelSet, TakesAFogVolumeWithAnIsoValueOnly) {
-    // Density falls from 1 inside to 0 within three voxels.
-    const auto grid =
-        openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(1.0f, openvdb::Vec3f(0.0f), 0.05f, 3.0f);
-    openvdb::tools::sdfToFogVolume(*grid);
-    ASSERT_EQ(grid->getGridClass(), openvdb::GRID_FOG_VOLUME);
-    EXPECT_THROW(LevelSet{grid}, InputError);
-    LevelSetOptions options;
-    options.iso = 0.5;
-    const LevelSet level_set(grid, options);
-    const auto probe = level_set.probe();
-    for (const Vec3& direction : near_sphere(300, 0.0)) {
-        EXPECT_NEAR(probe->value(0.925 * direction), 0.0, 0.004);  // half way through the three voxels
-        EXPECT_GT(probe->normal(0.925 * direction).dot(direction), 0.99);
-        // The slope is measured, so distances near the surface are of the world.
-        EXPECT_NEAR(probe->value(0.955 * direction), 0.03, 0.006);
-    }
-    EXPECT_LT(probe->value(Vec3::Zero()), 0.0);
-    EXPECT_GT(probe->value({3, 0, 0}), 0.0);
-    EXPECT_EQ(level_set.border_crossings(), 0u);
-
-    options.iso = 2.0;  // above every density
-    EXPECT_THROW(LevelSet(grid, options), InputError);
 }
 
 /// A dense block 0..n-1 in each axis, class level set, background 0, made of a function of the world

@@ -31,8 +31,8 @@ class LevelSet : public Surface {
 public:
     /// \throws InputError if the grid is neither float nor double, if its transform is not linear, or if it
     /// cannot be a level set: a grid with active voxels, of a class other than level set, whose values do not
-    /// take both signs around `iso`. A level set without voxels, or without a surface, is allowed: `bounds()`
-    /// is empty.
+    /// take both signs around `iso`, or a level set whose band ends before or about where it would have that
+    /// value. A level set without voxels, or without a surface, is allowed: `bounds()` is empty.
     explicit LevelSet(openvdb::GridBase::ConstPtr grid, const LevelSetOptions& options = {});
     ~LevelSet() override;
 

@@ -1,0 +1,100 @@
+// A surface where the values are something else than zero.
+#include <gtest/gtest.h>
+#include <openvdb/tools/LevelSetSphere.h>
+#include <openvdb/tools/LevelSetUtil.h>
+
+#include <string>
+
+#include "isotrack/error.h"
+#include "isotrack/surface/level_set.h"
+#include "support/unit_sphere.h"
+
+namespace isotrack {
+namespace {
+
+using support::near_sphere;
+constexpr double kVoxel = 0.05;
+constexpr double kBound = 0.5 * kVoxel * kVoxel;  // trilinear interpolation is off by less
+
+openvdb::FloatGrid::Ptr unit_sphere(float half_width) {
+    return openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(1.0f, openvdb::Vec3f(0.0f), kVoxel,
+                                                                    half_width);
+}
+
+TEST(IsoValue, PutsTheSurfaceAtTheIsoValue) {
+    const auto grid = unit_sphere(8.0f);
+    for (const double iso : {-0.15, 0.1, 0.2}) {
+        const LevelSet level_set(grid, {iso});
+        const auto probe = level_set.probe();
+        for (const Vec3& direction : near_sphere(300, 0.0)) {
+            const Vec3 p = (1.0 + iso) * direction;
+            EXPECT_NEAR(probe->value(p), 0.0, kBound);
+            EXPECT_NEAR(probe->value(p + 0.03 * direction), 0.03, kBound);
+        }
+        EXPECT_LT(probe->value(Vec3::Zero()), 0.0);
+        EXPECT_GT(probe->value({5, 0, 0}), 0.0);
+    }
+}
+
+TEST(IsoValue, TakesAFogVolumeWithAnIsoValueOnly) {
+    // Density falls from 1 inside to 0 within three voxels.
+    const auto grid = unit_sphere(3.0f);
+    openvdb::tools::sdfToFogVolume(*grid);
+    ASSERT_EQ(grid->getGridClass(), openvdb::GRID_FOG_VOLUME);
+    EXPECT_THROW(LevelSet{grid}, InputError);
+    const LevelSet level_set(grid, {0.5});
+    const auto probe = level_set.probe();
+    for (const Vec3& direction : near_sphere(300, 0.0)) {
+        EXPECT_NEAR(probe->value(0.925 * direction), 0.0, 0.004);  // half way through the three voxels
+        EXPECT_GT(probe->normal(0.925 * direction).dot(direction), 0.99);
+        // The slope is measured, so distances near the surface are of the world.
+        EXPECT_NEAR(probe->value(0.955 * direction), 0.03, 0.006);
+    }
+    EXPECT_LT(probe->value(Vec3::Zero()), 0.0);
+    EXPECT_GT(probe->value({3, 0, 0}), 0.0);
+    EXPECT_EQ(level_set.border_crossings(), 0u);
+
+    EXPECT_THROW(LevelSet(grid, {2.0}), InputError);  // above every density
+}
+
+TEST(IsoValue, IsRefusedWhereTheBandEnds) {
+    for (const double unit : {1.0, 1.0 / kVoxel}) {
+        const auto grid = unit_sphere(3.0f);
+        if (unit != 1.0) {
+            for (auto value = grid->beginValueAll(); value; ++value)
+                value.setValue(static_cast<float>(unit * *value));
+            openvdb::tools::changeBackground(grid->tree(), static_cast<float>(3.0 * kVoxel * unit));
+        }
+        EXPECT_FALSE(LevelSet(grid, {2.5 * kVoxel * unit}).empty());
+        for (const double voxels : {2.9, 3.0, 3.1, 40.0})
+            for (const double side : {-1.0, 1.0}) {
+                const double iso = side * voxels * kVoxel * unit;
+                try {
+                    const LevelSet level_set(grid, {iso});
+                    ADD_FAILURE() << iso << " of a band of " << grid->background();
+                } catch (const InputError& error) {
+                    EXPECT_NE(std::string(error.what()).find("band"), std::string::npos) << error.what();
+                }
+            }
+        for (const double voxels : {-1.25, 1.25}) {  // whole cells are in the band
+            const LevelSet level_set(grid, {voxels * kVoxel * unit});
+            const auto probe = level_set.probe();
+            for (const Vec3& direction : near_sphere(300, 0.0))
+                EXPECT_NEAR(probe->value((1.0 + voxels * kVoxel) * direction), 0.0, kBound);
+        }
+    }
+}
+
+TEST(IsoValue, MayHaveNoSurfaceInTheBand) {
+    // Blown up or shrunk by less than the band is wide, a frame may be empty.
+    const auto drop =
+        openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(0.09f, openvdb::Vec3f(0.0f), kVoxel, 3.0f);
+    EXPECT_TRUE(LevelSet(drop, {-2.2 * kVoxel}).empty());
+    auto none = openvdb::FloatGrid::create(0.15f);
+    none->setGridClass(openvdb::GRID_LEVEL_SET);
+    EXPECT_TRUE(LevelSet(none, {0.1}).empty());
+    EXPECT_TRUE(LevelSet(none, {40.0}).empty());
+}
+
+}  // namespace
+}  // namespace isotrack
