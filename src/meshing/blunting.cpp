@@ -89,7 +89,7 @@ bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replac
     if (!(facing(candidates) > std::min(kFacing, before.facing))) return false;
     const auto passes = [&](const Triangle& t) {
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-        const TriangleError error = certified_error(a, b, c, probe, resolution, 0.5 * tolerance);
+        const TriangleError error = certified_error(a, b, c, probe, detail, 0.5 * tolerance);
         return error.largest <= tolerance && error.turned_deg <= kMostTurnedDeg;
     };
     return std::all_of(candidates.begin(), candidates.end(), passes) && reach_what(before, candidates);
@@ -104,7 +104,8 @@ std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& 
 }
 
 Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
-                 const Surface& surface, const std::vector<const CrossingGrid*>& reached, double tolerance)
+                 const Surface& surface, const std::vector<const CrossingGrid*>& reached, double tolerance,
+                 std::optional<double> detail)
     : points_(points),
       triangles_(triangles),
       movable_(std::move(movable)),
@@ -112,6 +113,7 @@ Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, st
       surface_(surface),
       reached_(reached),
       tolerance_(tolerance),
+      detail_(detail.value_or(surface.resolution())),
       open_(points.size(), 1),
       unchecked_(triangles.size(), 0) {}
 Blunter::~Blunter() = default;
@@ -147,7 +149,7 @@ bool Blunter::pass() {
                      movable_,
                      fixed_,
                      tolerance_,
-                     surface_.resolution(),
+                     detail_,
                      *probe,
                      reached_,
                      lost_,

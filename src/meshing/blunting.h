@@ -32,7 +32,7 @@ struct BluntedMesh {
     const std::vector<char>& movable;
     const std::vector<char>& fixed;  ///< Per vertex: a move of it was taken back.
     double tolerance;
-    double resolution;  ///< Of the surface.
+    double detail;  ///< What is smaller need not be looked at.
     Surface::Probe& probe;
     const std::vector<const CrossingGrid*>& reached;
     std::set<std::pair<int, int>>&

@@ -100,52 +100,71 @@ double facing(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe
     return most;
 }
 
-double turned_deg(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, double resolution) {
-    constexpr double kLeastHeight = 0.5;  // resolutions
+double turned_deg(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, double detail) {
+    constexpr double kLeastHeight = 0.5;  // details
     constexpr double kLeastSlope = 0.6;
     constexpr double kDegrees = 57.29577951308232;
     const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-    const double least_area = kLeastHeight * resolution * std::sqrt(longest2);
+    const double least_area = kLeastHeight * detail * std::sqrt(longest2);
     if (!((b - a).cross(c - a).norm() > least_area) ||
         !(probe.sample((a + b + c) / 3.0).gradient.norm() > kLeastSlope))
         return 0.0;
     return kDegrees * std::acos(std::clamp(facing(a, b, c, probe), -1.0, 1.0));
 }
 
-int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution) {
+int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double detail) {
     const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-    const double wanted = std::ceil(std::sqrt(longest2) / resolution);
+    const double wanted = std::ceil(std::sqrt(longest2) / detail);
     return static_cast<int>(std::clamp<double>(wanted, kFewestSteps, kMostSteps));
 }
 
 TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
-                              double resolution, double refine_above) {
-    const int steps = error_steps(a, b, c, resolution);
+                              double detail, double refine_above) {
+    const int steps = error_steps(a, b, c, detail);
     auto [error, steepest] = survey(a, b, c, probe, steps, refine_above);
     if (steps < kMostSteps && (error.largest > kAlmost * refine_above || steepest > kSteep)) {
         const TriangleError again = triangle_error(a, b, c, probe, kMostSteps, refine_above);
         if (again.largest > error.largest) error = again;
     }
-    error.turned_deg = turned_deg(a, b, c, probe, resolution);
+    error.turned_deg = turned_deg(a, b, c, probe, detail);
     return error;
 }
 
-std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
-                                           const std::vector<Triangle>& triangles, const Surface& surface,
-                                           int steps, double refine_above) {
+namespace {
+
+/// `error_of(a, b, c, probe)` of each triangle.
+template <typename ErrorOf>
+std::vector<TriangleError> errors_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                     const Surface& surface, const ErrorOf& error_of) {
     std::vector<TriangleError> errors(triangles.size());
     ThreadProbes probes(surface);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
         Surface::Probe& probe = probes.local();
-        for (std::size_t t = range.begin(); t < range.end(); ++t) {
-            const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]],
-                       &c = points[triangles[t][2]];
-            errors[t] = steps == kStepsByLength
-                            ? certified_error(a, b, c, probe, surface.resolution(), refine_above)
-                            : triangle_error(a, b, c, probe, steps, refine_above);
-        }
+        for (std::size_t t = range.begin(); t < range.end(); ++t)
+            errors[t] =
+                error_of(points[triangles[t][0]], points[triangles[t][1]], points[triangles[t][2]], probe);
     });
     return errors;
+}
+
+}  // namespace
+
+std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
+                                           const std::vector<Triangle>& triangles, const Surface& surface,
+                                           int steps, double refine_above) {
+    return errors_of(points, triangles, surface,
+                     [&](const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
+                         return triangle_error(a, b, c, probe, steps, refine_above);
+                     });
+}
+
+std::vector<TriangleError> certified_errors(const std::vector<Vec3>& points,
+                                            const std::vector<Triangle>& triangles, const Surface& surface,
+                                            double detail, double refine_above) {
+    return errors_of(points, triangles, surface,
+                     [&](const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
+                         return certified_error(a, b, c, probe, detail, refine_above);
+                     });
 }
 
 std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell,

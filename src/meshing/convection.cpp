@@ -14,7 +14,7 @@ namespace isotrack {
 namespace {
 
 constexpr char kOutside = 0, kInside = 1, kFlat = 2;
-constexpr double kFar = 1.0;    // resolutions: a centroid that far from the surface is on the side it says
+constexpr double kFar = 1.0;    // details: a centroid that far from the surface is on the side it says
 constexpr double kClear = 0.5;  // length of the gradient: below it sheets are less than about a voxel apart
 
 /// The facet through which the flow leaves a cell: the circumcentre lies beyond it. -1 when the cell holds
@@ -31,18 +31,20 @@ int flow_exit(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell
 }  // namespace
 
 CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& points,
-                             const std::vector<Vec3>& normals, const Surface& surface) {
+                             const std::vector<Vec3>& normals, const Surface& surface,
+                             std::optional<double> detail) {
     std::vector<int> all(cells.size());
     std::iota(all.begin(), all.end(), 0);
     CellLabels labels;
-    update_labels(labels, all, cells, points, normals, surface);
+    update_labels(labels, all, cells, points, normals, surface, detail);
     return labels;
 }
 
 void update_labels(CellLabels& labels, const std::vector<int>& changed, const Tetrahedra& cells,
-                   const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
-                   const Surface& surface) {
+                   const std::vector<Vec3>& points, const std::vector<Vec3>& normals, const Surface& surface,
+                   std::optional<double> detail) {
     labels.resize(cells.size(), kOutside);
+    const double resolution = surface.resolution(), far = kFar * detail.value_or(resolution);
     ThreadProbes probes(surface);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, changed.size(), 512), [&](const auto& range) {
         Surface::Probe& probe = probes.local();
@@ -59,13 +61,13 @@ void update_labels(CellLabels& labels, const std::vector<int>& changed, const Te
             const Vec3 e1 = points[v[1]] - p0, e2 = points[v[2]] - p0, e3 = points[v[3]] - p0;
             const Vec3 centroid = p0 + 0.25 * (e1 + e2 + e3);
             double value = probe.value(centroid);
-            if (one_sheet && std::abs(value) < kFar * surface.resolution()) {
+            if (one_sheet && std::abs(value) < far) {
                 Vec3 centre;
                 const bool flat = !circumcentre(e1, e2, e3, centre);
                 const double at_centre = flat ? 0.0 : probe.value(p0 + centre);
                 // The gradient is dear, and matters only where the two do not agree.
                 if ((flat || (at_centre < 0.0) != (value < 0.0)) &&
-                    probe.sample(centroid).gradient.norm() > kClear) {
+                    (std::abs(value) >= resolution || probe.sample(centroid).gradient.norm() > kClear)) {
                     if (flat) {
                         labels[c] = kFlat;
                         continue;

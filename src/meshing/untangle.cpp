@@ -9,7 +9,7 @@
 namespace isotrack {
 namespace {
 
-constexpr double kUncertain = 0.5;  // resolutions
+constexpr double kUncertain = 0.5;  // details
 constexpr int kPasses = 4;
 
 /// An edge of the DT by one cell that has it: the edge between vertices a and b.
@@ -120,9 +120,9 @@ std::size_t count_tangles(const Tetrahedra& cells, const CellLabels& labels, con
 }  // namespace
 
 bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec3>& points,
-              const Surface& surface, const CarvedSurface& carved) {
+              const Surface& surface, const CarvedSurface& carved, std::optional<double> detail) {
     const auto probe = surface.probe();
-    const double limit = kUncertain * surface.resolution();
+    const double limit = kUncertain * detail.value_or(surface.resolution());
     struct Run {
         double certainty;
         std::vector<int> cells;

@@ -41,14 +41,19 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     if (grid.empty()) return 0;
     const double spacing = grid.spacing();
     std::vector<std::atomic<char>> covered(grid.size());  // marked by several threads
-    const auto mark = [&](const Vec3& p, const Vec3& n, double reach,
+    // `else_reach`: where the surface is not flat.
+    const auto mark = [&](const Vec3& p, const Vec3& n, double reach, double else_reach,
                           const std::vector<char>* columns = nullptr) {
-        reach = std::max(reach, 1.2 * spacing);  // a crossing lies within a cell's diagonal of its neighbours
-        const double off_plane = std::max(kOffPlane * reach, 0.5 * spacing);
+        // A crossing lies within a cell's diagonal of its neighbours.
+        reach = std::max(reach, 1.2 * spacing);
+        else_reach = std::max(else_reach, 1.2 * spacing);
         const auto mark_one = [&](std::size_t c) {
             const Surface::Crossing crossing = grid[c];
             const Vec3 way = crossing.point - p;
-            if (way.squaredNorm() > reach * reach || std::abs(n.dot(way)) >= off_plane) return;
+            const double near = crossing.flat ? reach : else_reach;
+            if (way.squaredNorm() > near * near ||
+                std::abs(n.dot(way)) >= std::max(kOffPlane * near, 0.5 * spacing))
+                return;
             const double facing = n.dot(crossing.outward.cast<double>());
             if (facing > kRounding ||
                 (facing > -kGrazing && way.squaredNorm() < kHere * spacing * kHere * spacing))
@@ -59,7 +64,8 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     const auto mark_all = [&](double share, const std::vector<char>* columns) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, particles.size(), 64), [&](const auto& range) {
             for (std::size_t i = range.begin(); i < range.end(); ++i)
-                mark(particles.position[i], particles.normal[i], share * particles.spacing[i], columns);
+                mark(particles.position[i], particles.normal[i], share * particles.spacing[i],
+                     share * particles.spacing[i], columns);
         });
     };
     if (particles.size() > 0) {
@@ -81,15 +87,19 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     };
     ThreadProbes probes(surface);
     const double largest =
-        std::max({kLargestSeed * spacing, limits.min_edge,
-                  kLargestSeedForError * std::min(limits.tolerance, surface.resolution())});
+                     std::max({kLargestSeed * spacing, limits.min_edge,
+                               kLargestSeedForError * std::min(limits.tolerance, surface.resolution())}),
+                 largest_flat = std::max(largest, kLargestSeedForError * limits.tolerance);
     const auto seed_at = [&](int c, Surface::Probe& probe) -> Seed {
-        const Vec3 start = grid[c].point;
+        const Surface::Crossing crossing = grid[c];
+        const Vec3 start = crossing.point;
         const auto p = probe.project(start);
         if (!p || (*p - start).norm() > 1.5 * surface.resolution()) return {};
         const Vec3 n = probe.normal(*p);
         if (!(n.squaredNorm() > 0.0)) return {};
-        return {*p, n, std::min(spacing_from_curvature(probe, *p, n, spacing, limits), largest)};
+        return {*p, n,
+                std::min(spacing_from_curvature(probe, *p, n, spacing, limits),
+                         crossing.flat ? largest_flat : largest)};
     };
     std::size_t added = 0;
     std::vector<int> batch;
@@ -109,7 +119,7 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
                 const auto& [p, n, h] = seeds[i];
                 if (!(h > 0.0)) continue;
                 particles.add(p, n, h, next_id++);
-                mark(p, n, apart * h);
+                mark(p, n, apart * h, apart * std::min(h, largest));
                 ++added;
             }
         }

@@ -147,10 +147,11 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
     return parents;
 }
 
-Densifier::Densifier(Particles& particles, const Surface& surface, double min_spacing, double max_spacing,
-                     std::size_t most, Id& next_id)
+Densifier::Densifier(Particles& particles, const Surface& surface, double detail, double min_spacing,
+                     double max_spacing, std::size_t most, Id& next_id)
     : particles_(particles),
       surface_(surface),
+      detail_(detail),
       min_spacing_(min_spacing),
       max_spacing_(max_spacing),
       most_(most),
@@ -199,7 +200,8 @@ std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
 
 int Densifier::add_or_nearest(const Vec3& place, double h) {
     constexpr double kApart = 0.7, kFar = 10.0;
-    constexpr double kFarthest = 8.0, kNearEnough = 0.5;  // resolutions
+    constexpr double kFarthest = 8.0;    // details
+    constexpr double kNearEnough = 0.5;  // resolutions
     int nearest = -1;
     if (particles_.size() >= most_) return nearest;
     auto projected = probe_->project(place);
@@ -207,8 +209,7 @@ int Densifier::add_or_nearest(const Vec3& place, double h) {
     if (!projected) return nearest;
     const Vec3 p = to_float_precision(*projected), n = probe_->normal(p);
     if (!(n.squaredNorm() > 0.0)) return nearest;
-    const double apart = kApart * h,
-                 far = std::max(apart, std::min(kFar * h, kFarthest * surface_.resolution()));
+    const double apart = kApart * h, far = std::max(apart, std::min(kFar * h, kFarthest * detail_));
     const double crowded = kApart * widest_of_call_;
     double least = far * far;
     bool taken = false;

@@ -78,7 +78,8 @@ CrossingGrid::CrossingGrid(double spacing, const Surface::CrossingSequence& cros
             const std::size_t column = column_of(offset);
             const auto direction = std::find(directions_.begin(), directions_.end(), crossing.outward);
             entries_[first_[column] + next[column].fetch_add(1, std::memory_order_relaxed)] = {
-                offset, static_cast<std::uint32_t>(direction - directions_.begin())};
+                offset, static_cast<std::uint32_t>(direction - directions_.begin()),
+                static_cast<std::uint32_t>(crossing.stands_for), crossing.flat};
         }
     });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns, 256), [&](const auto& range) {

@@ -34,6 +34,8 @@ constexpr double kNoLess = 0.5;
 constexpr double kFewNodes = 0.25;         // of the active ones
 constexpr double kProjectionError = 1e-4;  // voxels; float values carry no more
 constexpr double kFarVoxels = 10.0;        // values are clamped to this many voxels
+constexpr double kInBand = 0.8;            // of its half width: interpolated values are right up to there
+constexpr double kBeyondBand = 0.8;        // of it: distances are known as far beyond
 constexpr int kCapLayers = 4;              // voxels added beyond a block whose border cuts the surface
 constexpr double kMostCut = 0.6;           // of the crossings, by the end of the band: shreds otherwise
 constexpr int kLeafDim = Leaf::DIM;
@@ -326,7 +328,7 @@ struct LevelSet::Impl {
     AffineMap map;
     FloatGrid::ConstPtr grid;
     double scale = 1.0;
-    double reach = 0.0, slope = 1.0;
+    double band = 0.0, slope = 1.0;  // half width of the band
     std::size_t active_voxels = 0, border_crossings = 0;
     openvdb::GridBase::ConstPtr source;  // as it came
     CrossedEdges crossed;
@@ -379,7 +381,7 @@ struct LevelSet::Impl {
             found = find_crossed_edges(own->constTree());
         }
         const double background = grid->background();
-        reach = std::clamp(background, map.voxel_size, kFarVoxels * map.voxel_size);
+        band = std::clamp(background, map.voxel_size, kFarVoxels * map.voxel_size);
         crossed = std::move(found);
         bounds = tbb::parallel_reduce(
             tbb::blocked_range<std::size_t>(0, crossed.edges.size(), 4096), Box(),
@@ -501,11 +503,14 @@ std::optional<Surface::Diagonal> diagonal_beyond(const CrossedEdge& edge, int ot
 
 class GridProbe final : public Surface::Probe {
 public:
-    GridProbe(const FloatTree& tree, const AffineMap& map)
-        : Probe(kProjectionError * map.voxel_size, map.voxel_size), map_(map), stencil_(tree) {}
+    GridProbe(const FloatTree& tree, const AffineMap& map, double band)
+        : Probe(kProjectionError * map.voxel_size, map.voxel_size), map_(map), stencil_(tree), band_(band) {}
 
     double value(const Vec3& p) override { return stencil_.value(map_.to_index(p)).joined; }
-    double farther_value(const Vec3& p) override { return stencil_.value(map_.to_index(p)).farther; }
+    double farther_value(const Vec3& p) override {
+        const double value = stencil_.value(map_.to_index(p)).farther;
+        return std::abs(value) < kInBand * band_ ? value : beyond_band(p, value);
+    }
 
     Surface::Sample sample(const Vec3& p) override {
         Surface::Sample s = stencil_.sample(map_.to_index(p));
@@ -514,8 +519,56 @@ public:
     }
 
 private:
+    /// Beyond the band values are all alike. There the distance is that to a point in the band and its value,
+    /// no less than the true one; least where that point lies on the shortest way, which its gradient
+    /// tells. Where the band is not near it is as far as distances are known.
+    double beyond_band(const Vec3& p, double value) {
+        constexpr double kLeastSlope = 0.05;
+        const double side = value < 0.0 ? -1.0 : 1.0;
+        const double length = kBeyondBand * band_;
+        double distance = length + band_;
+        const auto value_at = [&](const Vec3& q) {
+            return std::abs(stencil_.value(map_.to_index(q)).farther);
+        };
+        const auto try_at = [&](const Vec3& q) {
+            const double there = value_at(q);
+            if (!(there < kInBand * band_ && length + there < distance)) return false;
+            distance = length + there;
+            return true;
+        };
+        const auto aim_from = [&](const Vec3& from) {
+            constexpr int kAims = 2;
+            Vec3 gradient = sample(from).gradient;
+            bool any = false;
+            for (int aim = 0; aim < kAims && gradient.norm() > kLeastSlope; ++aim) {
+                const Vec3 q = p - side * length * gradient.normalized();
+                if (!try_at(q)) break;
+                any = true;
+                if (aim + 1 < kAims) gradient = sample(q).gradient;
+            }
+            return any;
+        };
+        // Next to the band some nodes of it are around; else it is looked for.
+        if (!aim_from(p)) {
+            Vec3 nearest = p;
+            double least = band_;
+            for (int axis = 0; axis < 3; ++axis)
+                for (const double step : {-length, length}) {
+                    const Vec3 q = p + step * Vec3::Unit(axis);
+                    const double there = value_at(q);
+                    if (!(there < least)) continue;
+                    least = there;
+                    nearest = q;
+                }
+            if (least < kInBand * band_) distance = length + least;
+            aim_from(nearest);
+        }
+        return side * distance;
+    }
+
     const AffineMap& map_;
     Stencil stencil_;
+    const double band_;
 };
 
 }  // namespace
@@ -527,13 +580,13 @@ LevelSet::LevelSet(openvdb::GridBase::ConstPtr grid, const LevelSetOptions& opti
 LevelSet::~LevelSet() = default;
 
 std::unique_ptr<Surface::Probe> LevelSet::probe() const {
-    return std::make_unique<GridProbe>(impl_->grid->constTree(), impl_->map);
+    return std::make_unique<GridProbe>(impl_->grid->constTree(), impl_->map, impl_->band);
 }
 double LevelSet::resolution() const {
     return impl_->map.voxel_size;
 }
 double LevelSet::reach() const {
-    return impl_->reach;
+    return (kInBand + kBeyondBand) * impl_->band;
 }
 double LevelSet::slope() const {
     return impl_->slope;
@@ -558,10 +611,10 @@ bool LevelSet::at_border(const Vec3& p) const {
 }
 namespace {
 
-/// The edge in voxels of the largest cube of a leaf that is no longer than `length`; at least 1.
-int cube_within(double length, double voxel) {
+/// The edge in voxels, a power of two, of the largest cube that is no longer than `length`; from 1 to `most`.
+int cube_within(double length, double voxel, int most = kLeafDim) {
     int cube = 1;
-    while (cube < kLeafDim && 2 * cube * voxel <= length) cube *= 2;
+    while (cube < most && 2 * cube * voxel <= length) cube *= 2;
     return cube;
 }
 
@@ -583,13 +636,19 @@ private:
 }  // namespace
 
 Surface::CrossingSequence LevelSet::crossing_sequence(double apart) const {
+    constexpr double kFlat = 4.01;  // of `apart`: cubes where the surface may be flat
+    constexpr int kWidest = 64;     // voxels
     const std::vector<CrossedEdge>& edges = impl_->crossed.edges;
     const ToCrossing crossing(impl_->map);
     if (const int cube = cube_within(apart, resolution()); cube > 1) {
-        std::vector<std::size_t> some = thin_out(impl_->crossed, cube);
+        std::vector<StandIn> some =
+            thin_out(impl_->crossed, cube, cube_within(kFlat * apart, resolution(), kWidest));
         const std::size_t size = some.size();
         return {size, [&edges, crossing, chosen = std::move(some)](std::size_t i) {
-                    return crossing(edges[chosen[i]]);
+                    Crossing result = crossing(edges[chosen[i].edge]);
+                    result.stands_for = chosen[i].stands_for;
+                    result.flat = chosen[i].flat;
+                    return result;
                 }};
     }
     return {edges.size(), [&edges, crossing](std::size_t i) { return crossing(edges[i]); }};

@@ -12,6 +12,8 @@ namespace isotrack {
 namespace {
 
 constexpr double kNearlyTooFar = 0.8, kNearlyAtFolds = 0.1;  // of the tolerance
+// Spacings: so far around lie those that a crossing stands for.
+constexpr double kStandsForWithin = 0.5, kStandsForOnFlat = 2.0;
 constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
 
 template <typename Body>
@@ -66,17 +68,25 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
         crossings_.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
             for (std::size_t c = begin; c < end; ++c) {
                 const double d = at_crossings[c];
-                if (looked_at_[c] || d > kCertified * tolerance_ ||
-                    !(d > (at_fold[c] ? kNearlyAtFolds : kNearlyTooFar) * tolerance_))
-                    continue;
+                if (looked_at_[c] || d > kCertified * tolerance_) continue;
+                const bool fold = at_fold[c] && !crossings_[c].flat;
+                if (!(d > (fold ? kNearlyAtFolds : kNearlyTooFar) * tolerance_)) continue;
                 looked_at_[c] = 1;
                 found.push_back(static_cast<int>(c));
             }
         });
     if (!crossings_.thinned_out(surface_)) return cells_.around(doubtful);
-    std::vector<Vec3> places;
-    for (const int c : doubtful) places.push_back(crossings_[c].point);
-    return surface_.crossings_near(places, 0.5 * crossings_.spacing());
+    std::vector<Surface::Crossing> result;
+    for (const bool flat : {false, true}) {
+        std::vector<Vec3> places;
+        for (const int c : doubtful)
+            if (const Surface::Crossing crossing = crossings_[c]; crossing.flat == flat)
+                places.push_back(crossing.point);
+        const double within = flat ? kStandsForOnFlat : kStandsForWithin;
+        const auto near = surface_.crossings_near(places, within * crossings_.spacing());
+        result.insert(result.end(), near.begin(), near.end());
+    }
+    return result;
 }
 
 }  // namespace isotrack

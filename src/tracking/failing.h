@@ -9,7 +9,7 @@
 
 namespace isotrack {
 
-constexpr double kSuspect = 0.6;  // of the tolerance: above it a triangle's largest error is searched for
+constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's largest error is searched for
 constexpr double kCertified = 0.97;  // of the tolerance: samples at other places find it kept, too
 // The mean slope of a level set made of a mesh is 0.976: values over it still keep the tolerance. Where the
 // slope is less values are held to less.
@@ -23,23 +23,23 @@ inline bool is_turned(const TriangleError& error) {
 }
 
 /// Whether the angles of a triangle between particles matter: on smooth surface, and not tiny.
-inline bool angles_matter(const Particles& particles, const Triangle& corner, double resolution) {
+inline bool angles_matter(const Particles& particles, const Triangle& corner, double detail) {
     constexpr double kSmooth = 0.45;     // cosine between the normals of the corners
-    constexpr double kAnglesFrom = 1.0;  // resolutions: longest edge
+    constexpr double kAnglesFrom = 1.0;  // details: longest edge
     double longest = 0.0;
     for (int e = 0; e < 3; ++e) {
         const int a = corner[e], b = corner[(e + 1) % 3];
         if (!(particles.normal[a].dot(particles.normal[b]) > kSmooth)) return false;
         longest = std::max(longest, (particles.position[a] - particles.position[b]).norm());
     }
-    return longest > kAnglesFrom * resolution;
+    return longest > kAnglesFrom * detail;
 }
 
 /// Whether its particles make it too sharp, where that matters.
-inline bool is_needle(const Particles& particles, const Triangle& corner, double resolution) {
+inline bool is_needle(const Particles& particles, const Triangle& corner, double detail) {
     const auto& at = particles.position;
     return sharpness(at[corner[0]], at[corner[1]], at[corner[2]]) > kSharpnessAt22Degrees &&
-           angles_matter(particles, corner, resolution);
+           angles_matter(particles, corner, detail);
 }
 
 }  // namespace isotrack

@@ -52,7 +52,7 @@ void FrameWork::blunt() {
     const std::vector<Vec3> vertices_before = mesh.vertices;
     const std::vector<Triangle> triangles_before = mesh.carved.triangles;
     Blunter blunter(mesh.vertices, mesh.carved.triangles, movable(), surface, reached,
-                    kChangedShare * limits.tolerance);
+                    kChangedShare * limits.tolerance, limits.detail);
     // Where changed triangles are beyond the tolerance and farther off than those they stand for, and what is
     // missed that was not before.
     const auto spoilt = [&](bool look_between) {

@@ -19,7 +19,7 @@ namespace {
 constexpr double kLostAt = 3.0;      // tolerances
 constexpr double kMany = 0.3;        // of the triangles: when more change all distances are measured again
 constexpr double kFaultReach = 1.5;  // resolutions
-constexpr double kMissedSpacing = 0.75;                    // resolutions
+constexpr double kMissedSpacing = 0.75, kMissedAt = 1.3;   // resolutions, tolerances: no particle is nearer
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
 constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
 
@@ -40,32 +40,32 @@ Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
 /// The middle between the particles of the longest edge of a triangle that is too sharp across a crease or a
 /// rim: where that edge lies along the crease neither the other diagonal nor moving corners would do.
 std::optional<Shortage> crease_shortage(const FrameMesh& mesh, const Particles& particles,
-                                        std::size_t triangle, const Triangle& corner, double resolution) {
-    constexpr double kLeastHeight = 1.0;  // resolutions: what is thinner has needles anyway
+                                        std::size_t triangle, const Triangle& corner, double detail) {
+    constexpr double kLeastHeight = 1.0;  // details: what is thinner has needles anyway
     constexpr double kSpacing = 0.2;      // of the longest edge
     const Triangle& t = mesh.carved.triangles[triangle];
     const auto edge = [&](int k) -> Vec3 {
         return mesh.vertices[t[(k + 2) % 3]] - mesh.vertices[t[(k + 1) % 3]];
     };
     if (!(sharpness(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]) > kSharpnessAt18Degrees) ||
-        angles_matter(particles, corner, resolution))
+        angles_matter(particles, corner, detail))
         return std::nullopt;
     int k = 0;
     for (int i = 1; i < 3; ++i)
         if (edge(i).squaredNorm() > edge(k).squaredNorm()) k = i;
     const double longest = edge(k).norm();
-    if (edge(0).cross(edge(1)).norm() < kLeastHeight * resolution * longest) return std::nullopt;
+    if (edge(0).cross(edge(1)).norm() < kLeastHeight * detail * longest) return std::nullopt;
     const auto& at = particles.position;
     return Shortage{0.5 * (at[corner[(k + 1) % 3]] + at[corner[(k + 2) % 3]]), kSpacing * longest};
 }
 
 /// After the fit, too.
 bool is_needle_even_fitted(const FrameMesh& mesh, const Particles& particles, std::size_t triangle,
-                           const Triangle& corner, double resolution) {
+                           const Triangle& corner, double detail) {
     const auto& [i, j, k] = mesh.carved.triangles[triangle];
-    return is_needle(particles, corner, resolution) ||
+    return is_needle(particles, corner, detail) ||
            (sharpness(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]) > kSharpnessAt18Degrees &&
-            angles_matter(particles, corner, resolution));
+            angles_matter(particles, corner, detail));
 }
 
 }  // namespace
@@ -100,8 +100,8 @@ void Inspector::restart() {
 
 void Inspector::expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles) {
     expected_.emplace(Expected{{particles.size(), triangles}, {}});
-    expected_->errors = triangle_errors(particles, expected_->triangles.triangles(), surface_, kStepsByLength,
-                                        kSuspect * limits_.tolerance);
+    expected_->errors = certified_errors(particles, expected_->triangles.triangles(), surface_,
+                                         limits_.detail, kSuspect * limits_.tolerance);
 }
 
 std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
@@ -130,7 +130,7 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     for (std::size_t f = 0; f < facets.size(); ++f)
         if (!known[f]) fresh.push_back(from_least_corner(mesh.carved.triangles[f]));
     const auto errors =
-        triangle_errors(mesh.vertices, fresh, surface_, kStepsByLength, kSuspect * limits_.tolerance);
+        certified_errors(mesh.vertices, fresh, surface_, limits_.detail, kSuspect * limits_.tolerance);
     auto next = errors.begin();
     for (const TriangleError*& error : known)
         if (!error) error = &*next++;
@@ -169,8 +169,8 @@ void Inspector::take_missed(std::size_t d, Inspection& result) {
         for (const int i : survey.beyond)
             result.doubtful.push_back({distances_[d].points()[i].point, kVainSpacing * surface_.resolution(),
                                        kLeastDoubtful * surface_.resolution()});
-    } else if (const std::size_t found = crossings_.size() - survey.lost; found > 0) {
-        result.crossings_mean_square = survey.sum_of_squares / static_cast<double>(found);
+    } else if (survey.weight > 0.0) {
+        result.crossings_mean_square = survey.sum_of_squares / survey.weight;
     }
 }
 
@@ -312,9 +312,8 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             const auto [corner, whole] = corners_of(carved, t);
             const TriangleError& error = (*inspection.errors)[t];
             fails[t] = is_too_far(error, limits.tolerance) || is_turned(error) ||
-                       (whole && is_needle_even_fitted(mesh, particles, t, corner, surface.resolution()));
-            if (!fails[t] && whole)
-                at_crease[t] = crease_shortage(mesh, particles, t, corner, surface.resolution());
+                       (whole && is_needle_even_fitted(mesh, particles, t, corner, limits.detail));
+            if (!fails[t] && whole) at_crease[t] = crease_shortage(mesh, particles, t, corner, limits.detail);
         }
     });
     for (std::size_t t = 0; t < fails.size(); ++t) {
@@ -334,7 +333,8 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
         }
     }
     for (const auto& c : inspection.missed)
-        result.push_back({c.point, kMissedSpacing * surface.resolution()});
+        result.push_back(
+            {c.point, kMissedSpacing * std::max(surface.resolution(), kMissedAt * limits.tolerance)});
     result.insert(result.end(), inspection.doubtful.begin(), inspection.doubtful.end());
     for (const auto& e : carved.complex_edges)
         result.push_back({0.5 * (particles.position[e.from] + particles.position[e.to]),

@@ -70,7 +70,9 @@ MeshDistances::Survey MeshDistances::survey(double limit) const {
                 continue;
             }
             block.farthest = std::max(block.farthest, d);
-            block.sum_of_squares += d * d;
+            const double weight = points_[i].stands_for;
+            block.sum_of_squares += weight * d * d;
+            block.weight += weight;
         }
     });
     Survey result;
@@ -79,6 +81,7 @@ MeshDistances::Survey MeshDistances::survey(double limit) const {
         result.lost += block.lost;
         result.farthest = std::max(result.farthest, block.farthest);
         result.sum_of_squares += block.sum_of_squares;
+        result.weight += block.weight;
     }
     return result;
 }

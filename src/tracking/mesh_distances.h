@@ -30,7 +30,9 @@ public:
     struct Survey {
         std::vector<int> beyond;  ///< The points farther than a limit, lost ones among them; ascending.
         std::size_t lost = 0;     ///< Those beyond the cutoff.
-        double farthest = 0.0, sum_of_squares = 0.0;  ///< Of those that are not lost.
+        double farthest = 0.0;    ///< Of those that are not lost.
+        double sum_of_squares = 0.0,
+               weight = 0.0;  ///< Of these, each counted as many times as it stands for.
     };
     Survey survey(double limit) const;
 

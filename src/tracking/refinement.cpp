@@ -36,7 +36,7 @@ void refine(Tetrahedralisation& dt, CellLabels& labels, Particles& particles, De
     for (int round = 0; round < kMostRounds; ++round) {
         const Tetrahedra& cells = dt.cells();
         const std::vector<int> changed = dt.take_changed();
-        update_labels(labels, changed, cells, particles.position, particles.normal, surface);
+        update_labels(labels, changed, cells, particles.position, particles.normal, surface, limits.detail);
         const std::vector<BoundaryFacet> facets = boundary_of(changed, cells, labels);
         std::vector<Triangle> triangles;
         for (const auto& [cell, k] : facets) {
@@ -44,12 +44,12 @@ void refine(Tetrahedralisation& dt, CellLabels& labels, Particles& particles, De
             const auto& f = Tetrahedra::kFacet[k];
             triangles.push_back({v[f[0]], v[f[1]], v[f[2]]});
         }
-        const auto errors = triangle_errors(particles.position, triangles, surface, kStepsByLength,
-                                            kSuspect * limits.tolerance);
+        const auto errors = certified_errors(particles.position, triangles, surface, limits.detail,
+                                             kSuspect * limits.tolerance);
         std::vector<Shortage> shortages;
         for (std::size_t f = 0; f < facets.size(); ++f) {
             if (!is_too_far(errors[f], limits.tolerance) && !is_turned(errors[f]) &&
-                !is_needle(particles, triangles[f], surface.resolution()))
+                !is_needle(particles, triangles[f], limits.detail))
                 continue;
             const auto x = dual_crossing(cells, particles.position, facets[f][0], facets[f][1], *probe);
             if (x) shortages.push_back({*x, (*x - particles.position[triangles[f][0]]).norm()});

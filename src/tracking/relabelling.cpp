@@ -65,8 +65,8 @@ std::size_t reach_out(CellLabels& labels, const Tetrahedra& cells, const FrameMe
                 if (side == k) continue;
                 const auto& [i, j, l] = Tetrahedra::kFacet[side];
                 error = std::max(error, certified_error(particles.position[v[i]], particles.position[v[j]],
-                                                        particles.position[v[l]], *probe,
-                                                        surface.resolution(), kSuspect * limits.tolerance)
+                                                        particles.position[v[l]], *probe, limits.detail,
+                                                        kSuspect * limits.tolerance)
                                             .largest);
             }
             if (error <= tolerance && error < tips[v[k]]->error)

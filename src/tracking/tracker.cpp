@@ -63,7 +63,7 @@ constexpr double kDetailOfEdges = 0.25;
 constexpr double kLeastEdge = 0.5, kLargestEdge = 40.0;  // details
 constexpr double kCrossingsApart = 0.5;  // details: those between are looked at where they may be missed
 constexpr double kThick = 3.0, kThickNodes = 6.0;  // tolerances, resolutions: of a solid without thin parts
-constexpr double kBandShare = 0.8;                 // of the reach: interpolated values are right up to there
+constexpr double kBandShare = 0.85;  // of the reach: what is beyond the tolerance must be seen, too
 constexpr int kCertifyRounds = 24;
 constexpr int kMostTrials = 2;        // rounds of other labels: each takes some meshes
 constexpr int kMostRelabellings = 4;  // what changes sides might go on changing them
@@ -183,7 +183,8 @@ struct Tracker::Impl {
         if (options.reconstruction == Reconstruction::Pure)
             labels = pure_convection(cells, particles.position);
         else
-            update_labels(labels, changed, cells, particles.position, particles.normal, surface);
+            update_labels(labels, changed, cells, particles.position, particles.normal, surface,
+                          detail_of(options, surface));
         return mesh_of(labels, surface);
     }
 
@@ -193,7 +194,7 @@ struct Tracker::Impl {
         FrameMesh mesh;
         mesh.carved = carve(cells, of_cells, particles.position);
         if (options.reconstruction == Reconstruction::Guided &&
-            untangle(of_cells, cells, particles.position, surface, mesh.carved))
+            untangle(of_cells, cells, particles.position, surface, mesh.carved, detail_of(options, surface)))
             mesh.carved = carve(cells, of_cells, particles.position);
         mesh.vertices.reserve(mesh.carved.particle.size());
         std::size_t midpoint = 0;
@@ -209,7 +210,7 @@ struct Tracker::Impl {
         const auto most =
             kMostAnyway + static_cast<std::size_t>(kMostPerCrossing * finer * static_cast<double>(crossings));
         const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
-        return {particles, surface, least, l.max_edge, most, next_id};
+        return {particles, surface, l.detail, least, l.max_edge, most, next_id};
     }
 
     /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
@@ -532,6 +533,7 @@ SizingLimits sizing_limits(const TrackerOptions& options, const Surface& surface
     l.tolerance = effective_tolerance(options, surface) * std::min(1.0, surface.slope() / kFullSlope);
     l.angle = options.angle_deg.value_or(default_angle_deg(options.method)) * kPi / 180.0;
     l.angle_floor = kAngleFloor * detail;
+    l.detail = detail;
     l.min_edge = options.min_edge.value_or(kLeastEdge * detail);
     l.max_edge = std::max(options.max_edge.value_or(kLargestEdge * detail), l.min_edge);
     l.mean_square_counts = options.fit;

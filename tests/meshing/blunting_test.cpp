@@ -170,8 +170,8 @@ TEST(Blunter, KeepsTheToleranceAsItIsCertified) {
     Blunter blunter(mesh.points, mesh.triangles, all_of(mesh, true), *rippled, reached, kCertifiedTolerance);
     ASSERT_TRUE(blunter.run(kPasses));
     EXPECT_GT(blunter.changes().size(), 50u);
-    const auto errors =
-        triangle_errors(mesh.points, mesh.triangles, *rippled, kStepsByLength, 0.6 * kCertifiedTolerance);
+    const auto errors = certified_errors(mesh.points, mesh.triangles, *rippled, rippled->resolution(),
+                                         0.6 * kCertifiedTolerance);
     for (const Blunting& change : blunter.changes())
         for (const int t : change.triangle) EXPECT_LE(errors[t].largest, kCertifiedTolerance);
 }

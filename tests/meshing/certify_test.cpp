@@ -31,7 +31,8 @@ protected:
             Box(Vec3(-1, -1, -1), Vec3(3, 3, 1)), 1.0);
     }
     TriangleError found(double height, double refine_above) const {
-        return triangle_errors(points, {{0, 1, 2}}, *bumps(height), kStepsByLength, refine_above)[0];
+        return certified_errors(points, {{0, 1, 2}}, *bumps(height), bumps(height)->resolution(),
+                                refine_above)[0];
     }
 };
 

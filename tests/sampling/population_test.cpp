@@ -163,8 +163,9 @@ TEST(Densifier, StopsAtTheMostThatMayBe) {
     particles.add({0, 0, 1}, {0, 0, 1}, 0.4, 0);
     Id next_id = 1;
     const std::vector<Shortage> places = {{{0, 0, 1}, 0.4}, {{1, 0, 0}, 0.4}, {{0, 1, 0}, 0.4}};
-    EXPECT_EQ(Densifier(particles, *sphere, 0.05, kNoLimit, 1, next_id).add(places), 0u);
-    Densifier five(particles, *sphere, 0.05, kNoLimit, 5, next_id);
+    EXPECT_EQ(Densifier(particles, *sphere, sphere->resolution(), 0.05, kNoLimit, 1, next_id).add(places),
+              0u);
+    Densifier five(particles, *sphere, sphere->resolution(), 0.05, kNoLimit, 5, next_id);
     EXPECT_EQ(five.add(places), 4u);
     EXPECT_EQ(particles.size(), 5u);
     EXPECT_EQ(five.add(places), 0u);
@@ -175,7 +176,7 @@ TEST(Densifier, AddsWhereThereIsRoomSurroundsWhereNotAndComesToAnEnd) {
     Particles particles;
     particles.add({0, 0, 1}, {0, 0, 1}, 0.4, 0);
     Id next_id = 1;
-    Densifier densifier(particles, *sphere, 0.05, kNoLimit, 1000, next_id);
+    Densifier densifier(particles, *sphere, sphere->resolution(), 0.05, kNoLimit, 1000, next_id);
     EXPECT_EQ(densifier.add({}), 0u);
     EXPECT_EQ(densifier.add({{{1.1, 0, 0}, 0.4}}), 1u);
     ASSERT_EQ(particles.size(), 2u);
@@ -214,7 +215,7 @@ TEST(Densifier, GivesRoomForOneAtATimeWhereParticlesAreFarApart) {
     Particles particles;
     particles.add({0, 0, 1}, {0, 0, 1}, 0.8, 0);
     Id next_id = 1;
-    Densifier densifier(particles, *sphere, 0.01, kNoLimit, 1000, next_id);
+    Densifier densifier(particles, *sphere, sphere->resolution(), 0.01, kNoLimit, 1000, next_id);
     const Vec3 place = Vec3(0.6, 0, 0.8), beside = Vec3(0.65, 0.02, 0.76).normalized();
     const std::vector<Shortage> both = {{place, 0.1}, {beside, 0.1}};
     EXPECT_EQ(densifier.add(both), 1u);
@@ -231,7 +232,7 @@ TEST(Densifier, GivesNoSpacingAboveItsLargest) {
     Particles particles;
     particles.add({0, 0, 1}, {0, 0, 1}, 0.3, 0);
     Id next_id = 1;
-    Densifier densifier(particles, *sphere, 0.01, 0.3, 1000, next_id);
+    Densifier densifier(particles, *sphere, sphere->resolution(), 0.01, 0.3, 1000, next_id);
     EXPECT_EQ(densifier.add({{{0.6, 0, 0.8}, 0.1}, {{0, 0, -1}, 0.5}}), 2u);
     for (const double h : particles.spacing) EXPECT_LE(h, 0.3);
 }
@@ -242,7 +243,7 @@ TEST(Densifier, GetsDenserUntilASmallBodyHasRoomForMore) {
     Particles particles;
     particles.add({0, 0, 0.03}, {0, 0, 1}, 1.0, 0);
     Id next_id = 1;
-    Densifier densifier(particles, *ball, 1e-4, kNoLimit, 1000, next_id);
+    Densifier densifier(particles, *ball, ball->resolution(), 1e-4, kNoLimit, 1000, next_id);
     EXPECT_EQ(densifier.add({{{0, 0, 0.03}, 0.4, 0.1}}), 0u);
     EXPECT_GT(densifier.add({{{0, 0, 0.03}, 0.4, 0.001}}), 0u);
     EXPECT_LT(particles.spacing[0], 0.1);

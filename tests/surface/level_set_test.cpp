@@ -186,7 +186,39 @@ TEST(LevelSet, IsTheSphereItWasMadeFrom) {
     EXPECT_EQ(level_set.active_voxels(), grid->activeVoxelCount());
     EXPECT_EQ(level_set.border_crossings(), 0u);
     EXPECT_EQ(level_set.crossing_count(), brute_force_crossings(*grid, grid->evalActiveVoxelBoundingBox()));
-    EXPECT_NEAR(level_set.reach(), 3.0 * h, 1e-6);
+    EXPECT_NEAR(level_set.reach(), 4.8 * h, 1e-6);
+}
+
+TEST(LevelSet, KnowsDistancesALittleBeyondItsBand) {
+    const double h = 0.02;
+    // A ball with a thin plate above it, so that the nearest part of the band is not always the nearest
+    // surface.
+    const auto shape =
+        shapes::unite({shapes::sphere({0, 0, 0}, 0.6, h), shapes::box({0, 0, 0.8}, {0.5, 0.5, 2.0 * h}, h)});
+    const LevelSet level_set(rasterise(*shape, h));
+    const auto probe = level_set.probe(), truth = shape->probe();
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> coordinate(-1.0, 1.0);
+    // Beside nodes beyond the band, which say no more than its half width, interpolated values are that much
+    // less.
+    constexpr double kClamped = 0.15;
+    std::size_t beyond = 0;
+    double sum = 0.0;
+    for (int i = 0; i < 200000; ++i) {
+        const Vec3 p(coordinate(random), coordinate(random), coordinate(random));
+        const double distance = truth->value(p), found = probe->farther_value(p);
+        if (std::abs(distance) < 0.1 * h) continue;
+        ASSERT_EQ(found < 0.0, distance < 0.0) << p.transpose();
+        if (std::abs(distance) > level_set.reach() + 0.1 * h) {
+            ASSERT_GE(std::abs(found), level_set.reach()) << p.transpose();
+        } else if (std::abs(distance) > 3.0 * h && std::abs(distance) < level_set.reach()) {
+            ASSERT_GE(std::abs(found), std::abs(distance) - kClamped * h) << p.transpose();
+            sum += std::abs(found) - std::abs(distance);
+            ++beyond;
+        }
+    }
+    ASSERT_GT(beyond, 1000u);
+    EXPECT_LT(sum / static_cast<double>(beyond), 0.1 * h);
 }
 
 TEST(LevelSet, AgreesWithOpenVdbsTrilinearSampler) {
@@ -264,7 +296,7 @@ TEST(LevelSet, TurnsVoxelUnitsIntoWorldUnits) {
     EXPECT_EQ(small.value_scale(), small.voxel_size());
     EXPECT_NEAR(small.value_scale(), 0.05, 1e-15);
     expect_unit_sphere(small, 0.05);
-    EXPECT_NEAR(small.reach(), 0.15, 1e-6);
+    EXPECT_NEAR(small.reach(), 0.24, 1e-6);
 
     const auto grid =
         openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(20.0f, openvdb::Vec3f(0.0f), 1.0f, 3.0f);

@@ -54,10 +54,20 @@ TEST(LevelSet, LetsACrossingStandForOthersInACube) {
             // One axis-parallel cube holds both, a voxel added for the lengths of the edges.
             const bool stands_for =
                 std::any_of(some.begin(), some.end(), [&](const Surface::Crossing& other) {
-                    return (other.point - c.point).cwiseAbs().maxCoeff() <= (cube + 1) * h;
+                    const int edge = other.flat ? 4 * cube : cube;
+                    return (other.point - c.point).cwiseAbs().maxCoeff() <= (edge + 1) * h;
                 });
             ASSERT_TRUE(stands_for) << c.point.transpose();
         }
+        std::size_t stood_for = 0, flat = 0;
+        for (const auto& c : some) {
+            stood_for += static_cast<std::size_t>(c.stands_for);
+            if (!c.flat) continue;
+            ++flat;
+            EXPECT_GT((c.point - Vec3(1.013, 0.02, 0.51)).norm(), 2.0 * h) << "a drop is not flat";
+        }
+        EXPECT_EQ(stood_for, all.size());
+        EXPECT_TRUE(flat > 0 || cube > 2);  // the ball is too round for more
         // Of the plate both sides are seen.
         for (const double side : {-1.0, 1.0})
             EXPECT_TRUE(std::any_of(some.begin(), some.end(), [&](const Surface::Crossing& c) {

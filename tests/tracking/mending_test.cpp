@@ -43,6 +43,7 @@ struct Carved {
         limits.tolerance = 0.1 * edge;  // for the seeds
         limits.angle = 0.7;
         limits.min_edge = limits.max_edge = edge;
+        limits.detail = surface.resolution();
         Id next_id = 0;
         cover(particles, surface, CrossingGrid(surface), limits, 1, next_id);
         limits.tolerance = tolerance;

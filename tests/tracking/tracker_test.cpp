@@ -544,6 +544,30 @@ TEST(Tracker, SaysWhatTheOptionsComeTo) {
     EXPECT_LE(sizing_limits(bounded, *sphere).min_edge, 2.0 * kVoxel);
 }
 
+TEST(Tracker, KeepsACoarseToleranceOnAFineGridWithFewParticles) {
+    // The same sphere and tolerance on two grids: half a voxel of one is four of the other, beyond its band.
+    const double tolerance = 0.02;
+    std::vector<std::size_t> particles;
+    for (const double voxel : {2.0 * tolerance, 0.25 * tolerance}) {
+        const LevelSet level_set(rasterise(*sphere_at({0, 0, 0}), voxel));
+        Tracker tracker(with_tolerance(tolerance));
+        for (int frame = 0; frame < 2; ++frame) {
+            const TrackedFrame result = tracker.advance(level_set);
+            EXPECT_EQ(result.tolerance, tolerance);
+            expect_sound(result, 1, 2, "sphere");
+            const auto probe = sphere_at({0, 0, 0})->probe();
+            for (const Triangle& t : result.mesh.triangles) {
+                const Vec3 middle =
+                    (result.mesh.points[t[0]] + result.mesh.points[t[1]] + result.mesh.points[t[2]]) / 3.0;
+                EXPECT_LE(std::abs(probe->value(middle)), tolerance);
+            }
+            if (frame == 1) particles.push_back(result.particles);
+        }
+    }
+    EXPECT_LT(particles[1],
+              particles[0] * 3 / 2);  // in the band alone it would be held to 0.6 of the tolerance
+}
+
 TEST(Tracker, HoldsAToleranceBeyondTheBandToIt) {
     const LevelSet level_set(rasterise(*sphere_at({0, 0, 0}), 0.02));
     Tracker tracker(with_tolerance(0.2));

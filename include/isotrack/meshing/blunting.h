@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -26,10 +27,11 @@ class TriangleBoxes;
 class Blunter {
 public:
     /// `reached`: points of the surface, such as its lattice crossings, for triangles to stand for; more may
-    /// come between runs. All but `movable` (one entry per point) must outlive it; nobody else may change the
-    /// mesh meanwhile.
+    /// come between runs. `detail`: that of `certified_error`; unset: the surface's resolution. All but
+    /// `movable` (one entry per point) must outlive it; nobody else may change the mesh meanwhile.
     Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
-            const Surface& surface, const std::vector<const CrossingGrid*>& reached, double tolerance);
+            const Surface& surface, const std::vector<const CrossingGrid*>& reached, double tolerance,
+            std::optional<double> detail = {});
     ~Blunter();
 
     /// Looks at the triangles with an angle below 30 degrees, sharpest first, but for those that were looked
@@ -61,7 +63,7 @@ private:
     std::vector<char> movable_, fixed_;  // fixed: a move was taken back
     const Surface& surface_;
     const std::vector<const CrossingGrid*>& reached_;
-    double tolerance_;
+    double tolerance_, detail_;
     std::vector<char> open_;       // per vertex: triangles around it are to be looked at
     std::vector<char> unchecked_;  // per triangle: changed since crossings were looked for
     std::vector<Blunting> changes_;

@@ -30,28 +30,29 @@ constexpr double kMostTurnedDeg = 60.0, kFacing = 0.5;
 /// The cosine between the normal of triangle abc and O2 at its centroid; where that is below kFacing, the
 /// largest of it and those at the corners: a triangle across a crease may face as one of the sides does.
 double facing(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe);
-/// That as an angle in degrees; 0 where it says nothing: on triangles less than half a `resolution` high, and
+/// That as an angle in degrees; 0 where it says nothing: on triangles less than half a `detail` high, and
 /// where the gradient at the centroid is shorter than 0.6, inside of what is thinner than two voxels.
-double turned_deg(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
-                        double resolution);
+double turned_deg(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, double detail);
 
-/// The intervals per edge that show the error of triangle abc: one per resolution of the surface on its
-/// longest edge, but 3 at least and 6 at most.
-int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double resolution);
+/// The intervals per edge that show the error of triangle abc: one per `detail` on its longest edge, but 3 at
+/// least and 6 at most.
+int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double detail);
 /// The error of triangle abc with `error_steps` intervals per edge; where that is above 1.4 `refine_above`
 /// or changes steeply, by 0.3 of the way between points or more, with 6 as well, and the larger of the two.
-/// Its normal, too. `refine_above`: as for `triangle_error`.
+/// Its normal, too. `detail`: what is smaller need not be seen, at least the surface's resolution;
+/// `refine_above`: as for `triangle_error`.
 TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
-                              double resolution, double refine_above);
-/// Instead of a number: that of `certified_error`.
-constexpr int kStepsByLength = 0;
+                              double detail, double refine_above);
 
-/// That of each triangle; `steps` may be kStepsByLength. Uses TBB inside; the result does not depend on the
-/// number of threads.
+/// `triangle_error` of each triangle. Uses TBB inside; the result does not depend on the number of threads.
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps,
                                            double refine_above = std::numeric_limits<double>::infinity());
+/// The same of `certified_error`.
+std::vector<TriangleError> certified_errors(const std::vector<Vec3>& points,
+                                            const std::vector<Triangle>& triangles, const Surface& surface,
+                                            double detail, double refine_above);
 
 /// Where to put a particle that mends a facet of the boundary between inside and outside: the point of the
 /// surface at the same distance from the facet's three vertices, on the dual edge between the circumcentres

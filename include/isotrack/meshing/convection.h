@@ -1,6 +1,7 @@
 // Which cells of the Delaunay tetrahedralisation are solid: the result of the convection front.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "isotrack/delaunay/tetrahedralisation.h"
@@ -24,15 +25,18 @@ using CellLabels = std::vector<char>;
 ///   is coherent among the slivers that lie on the sheet;
 /// - any other cell spans two sheets, a thin solid or a gap, where the circumcentre may lie beyond the far
 ///   sheet: it is inside when its centroid is. So is a cell where the gradient is short, since sheets less
-///   than a voxel apart blur each other's normals, and one with its centroid a voxel or more from the
+///   than a voxel apart blur each other's normals, and one with its centroid a detail or more from the
 ///   surface, which no sliver on a sheet has.
-/// A cell too flat to have a circumcentre takes the label of the cell it flows to.
+/// A cell too flat to have a circumcentre takes the label of the cell it flows to. `detail`: at least two
+/// tolerances and the surface's resolution, which it is when unset.
 CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& points,
-                             const std::vector<Vec3>& normals, const Surface& surface);
+                             const std::vector<Vec3>& normals, const Surface& surface,
+                             std::optional<double> detail = {});
 
 /// The same for the slots in `changed` alone, in `labels`, which grows to one entry per slot.
 void update_labels(CellLabels& labels, const std::vector<int>& changed, const Tetrahedra& cells,
-                   const std::vector<Vec3>& points, const std::vector<Vec3>& normals, const Surface& surface);
+                   const std::vector<Vec3>& points, const std::vector<Vec3>& normals, const Surface& surface,
+                   std::optional<double> detail = {});
 
 /// The paper's reconstruction: the particles alone, from the hull inwards, by the exact oriented Gabriel
 /// test. Voids stay filled.

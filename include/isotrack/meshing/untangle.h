@@ -1,6 +1,7 @@
 // Labels without edges and vertices at which the solid touches itself.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "isotrack/meshing/manifold.h"
@@ -15,6 +16,6 @@ namespace isotrack {
 /// fewer such edges and vertices than before. `carved`: of these labels. Deterministic. False when no
 /// label changed.
 bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec3>& points,
-              const Surface& surface, const CarvedSurface& carved);
+              const Surface& surface, const CarvedSurface& carved, std::optional<double> detail = {});
 
 }  // namespace isotrack

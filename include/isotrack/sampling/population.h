@@ -43,10 +43,11 @@ struct Shortage {
 /// Adds particles where the mesh fails, call by call. Between calls no particle may be moved or removed.
 class Densifier {
 public:
-    /// There will be no more than `most` particles, and no new one's spacing will be outside `min_spacing` to
-    /// `max_spacing`. All references must outlive it.
-    Densifier(Particles& particles, const Surface& surface, double min_spacing, double max_spacing,
-              std::size_t most, Id& next_id);
+    /// `detail`: what is smaller need not be looked at; the surface's resolution, or more where the tolerance
+    /// is wide. There will be no more than `most` particles, and no new one's spacing will be outside
+    /// `min_spacing` to `max_spacing`. All references must outlive it.
+    Densifier(Particles& particles, const Surface& surface, double detail, double min_spacing,
+              double max_spacing, std::size_t most, Id& next_id);
 
     /// Adds particles at the projections of `shortages` (where there is none, on the surface within half a
     /// resolution, if that is there), in their order, at places that floats can hold: at least 0.7 of the
@@ -56,7 +57,7 @@ public:
     /// distance, so that repeated calls get denser; where there is no place for any, as on what is smaller
     /// than the ring, that becomes smaller still. Where there is room for more than the wanted spacing a
     /// particle takes the distance to the nearest for its own (up to ten times the wanted one and eight
-    /// resolutions), and no other of the same call is added within 0.7 of that: it is seen first what the one
+    /// details), and no other of the same call is added within 0.7 of that: it is seen first what the one
     /// has mended. Returns how many were added: 0 means that nothing more can be done.
     std::size_t add(const std::vector<Shortage>& shortages);
 
@@ -67,7 +68,7 @@ private:
 
     Particles& particles_;
     const Surface& surface_;
-    double min_spacing_, max_spacing_;
+    double detail_, min_spacing_, max_spacing_;
     std::size_t most_;
     Id& next_id_;
     std::unique_ptr<Surface::Probe> probe_;

@@ -21,6 +21,7 @@ struct SizingLimits {
     /// tenth of them have hardly any error, being there only because the spacing must not jump from small to
     /// large, everywhere: down to 0.35 where about half of them have none.
     bool mean_square_counts = false;
+    double detail = 0.0;    ///< What is smaller need not be looked at: the surface's resolution, or more.
     double thinning = 0.5;  ///< Least factor of 1/h^2 in one update: near 1 a population thins out slowly.
 };
 

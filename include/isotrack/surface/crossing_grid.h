@@ -26,7 +26,8 @@ public:
     /// Its point is exact to 1e-7 of the extent of them all.
     Surface::Crossing operator[](std::size_t i) const {
         const Entry& e = entries_[i];
-        return {origin_ + e.offset.cast<double>(), directions_[e.direction]};
+        return {origin_ + e.offset.cast<double>(), directions_[e.direction], static_cast<int>(e.stands_for),
+                e.flat != 0};
     }
     double spacing() const { return spacing_; }
     /// Whether some of a surface's crossings stand for all.
@@ -73,8 +74,9 @@ private:
 
     /// A crossing in 16 bytes: there are more of them than of all else.
     struct Entry {
-        Eigen::Vector3f offset;   // from origin_
-        std::uint32_t direction;  // number among directions_
+        Eigen::Vector3f offset;        // from origin_
+        std::uint32_t direction : 16;  // number among directions_
+        std::uint32_t stands_for : 15, flat : 1;
     };
     int column(int axis, double offset) const {
         return static_cast<int>(std::clamp(offset / width_, 0.0, static_cast<double>(count_[axis] - 1)));

@@ -30,11 +30,12 @@ public:
     public:
         virtual ~Probe() = default;
 
-        /// Right in sign everywhere; right in size only below `Surface::reach()`.
+        /// Right in sign everywhere; right in size near the surface: within the band of a grid.
         virtual double value(const Vec3& p) = 0;
 
         /// The value, or another that is farther off on the same side, by up to twice, where the surface may
-        /// be read in more than one way: what meshes are held to.
+        /// be read in more than one way: what meshes are held to. Right in size below `Surface::reach()`, and
+        /// no less than that beyond.
         virtual double farther_value(const Vec3& p) { return value(p); }
 
         /// Value and gradient together, for less than the price of both.
@@ -66,11 +67,11 @@ public:
     /// Length of the smallest detail, world units: the voxel size for a grid.
     virtual double resolution() const = 0;
 
-    /// Half width of the band in which values are distances, world units.
+    /// How far from the surface distances are known, world units.
     virtual double reach() const { return std::numeric_limits<double>::infinity(); }
 
-    /// Mean length of the gradient at the surface, in (0, 1]: less than 1 where values are interpolated around
-    /// what is a few resolutions small. Distances near the surface are the values over it.
+    /// Mean length of the gradient at the surface, in (0, 1]: less than 1 where values are interpolated
+    /// around what is a few resolutions small. Distances near the surface are the values over it.
     virtual double slope() const { return 1.0; }
 
     /// A box that holds the surface; empty when there is none.
@@ -87,6 +88,8 @@ public:
     struct Crossing {
         Vec3 point;               ///< Linearly interpolated along the edge.
         Eigen::Vector3f outward;  ///< Unit direction of the edge, from its end inside to its end outside.
+        int stands_for = 1;       ///< So many crossings, itself among them.
+        bool flat = false;        ///< The surface is a flat sheet where they are.
     };
 
     /// Crossings that are made when they are asked for: a list of them would take more memory than all else.
@@ -97,8 +100,8 @@ public:
     };
     /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
     /// in the same order. Of those within a cube of an edge up to `apart` some along one axis may stand for
-    /// all: one that goes out and one that goes in, where there are both. This default scans `bounds()` and
-    /// gives all.
+    /// all: one that goes out and one that goes in, where there are both; where the surface is a flat sheet,
+    /// four within a cube of up to four times that. This default scans `bounds()` and gives all.
     virtual CrossingSequence crossing_sequence(double apart) const;
     /// A list of them.
     std::vector<Crossing> crossings(double apart = 0.0) const;

@@ -54,7 +54,7 @@ struct TrackerOptions {
     std::uint64_t seed = 1;  ///< Same seed, same surfaces: same meshes, at any thread count.
 };
 
-/// The tolerance, but no more than 0.8 of the surface's `reach()`: beyond it distances are not known.
+/// The tolerance, but no more than 0.85 of the surface's `reach()`: beyond it distances are not known.
 double effective_tolerance(const TrackerOptions& options, const Surface& surface);
 
 /// What these options come to on a surface. The tolerance is of values, which are less than distances where
