@@ -79,7 +79,8 @@ struct TrackedFrame {
     double tolerance = 0.0;  ///< The effective one.
     /// The larger of the distances mesh to surface (values over the surface's slope, at up to 28 points of
     /// each triangle) and back (at the lattice crossings, of which those nearer to each other than two
-    /// tolerances stand for one another; where they are so far apart anyway also at points between those that
+    /// tolerances stand for one another, and four for all of a flat sheet in a cube of four tolerances; where
+    /// they are so far apart anyway also at points between those that
     /// are nearly too far off, at folds of the mesh, or in cells with an ambiguous face, but for points that
     /// no vertex on the surface reaches), measured on `mesh`, world units; RMS likewise, but for the points
     /// between. What is farther than about three tolerances from any triangle that faces its way is counted
