@@ -1,24 +1,22 @@
 #include "isotrack/surface/level_set.h"
 
-#include <openvdb/tools/SignedFloodFill.h>
 #include <openvdb/tools/ValueTransformer.h>
 #include <openvdb/tools/VolumeToMesh.h>
-#include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
-#include <limits>
 
 #include "component_boxes.h"
 #include "find_in_blocks.h"
 #include "isotrack/error.h"
+#include "surface/affine_map.h"
 #include "surface/ambiguous_faces.h"
 #include "surface/crossed_edges.h"
+#include "surface/grid_probe.h"
+#include "surface/grid_values.h"
 #include "surface/lattice_mesh.h"
 
 namespace isotrack {
@@ -27,205 +25,9 @@ namespace {
 using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
-using Leaf = FloatTree::LeafNodeType;
 
-// Of the trilinear value: with less the joined surface is near, which must do.
-constexpr double kNoLess = 0.5;
-constexpr double kFewNodes = 0.25;         // of the active ones
-constexpr double kProjectionError = 1e-4;  // voxels; float values carry no more
-constexpr double kFarVoxels = 10.0;        // values are clamped to this many voxels
-constexpr double kInBand = 0.8;            // of its half width: interpolated values are right up to there
-constexpr double kBeyondBand = 0.8;        // of it: distances are known as far beyond
-constexpr int kCapLayers = 4;              // voxels added beyond a block whose border cuts the surface
-constexpr double kMostCut = 0.6;           // of the crossings, by the end of the band: shreds otherwise
-constexpr int kLeafDim = Leaf::DIM;
-
-Vec3 to_eigen(const openvdb::Vec3d& v) {
-    return {v.x(), v.y(), v.z()};
-}
-
-std::string grid_label(const openvdb::GridBase& grid) {
-    return grid.getName().empty() ? "unnamed grid" : "grid '" + grid.getName() + "'";
-}
-
-struct AffineMap {
-    Mat3 linear, inverse;
-    Vec3 shift;
-    double voxel_size;
-
-    explicit AffineMap(const openvdb::GridBase& grid) {
-        if (!grid.transform().isLinear())
-            throw InputError(grid_label(grid) + " has a frustum transform; resample it to a linear one");
-        shift = to_eigen(grid.indexToWorld(openvdb::Vec3d(0.0)));
-        for (int axis = 0; axis < 3; ++axis) {
-            openvdb::Vec3d unit(0.0);
-            unit[axis] = 1.0;
-            linear.col(axis) = to_eigen(grid.indexToWorld(unit)) - shift;
-        }
-        const double volume = std::abs(linear.determinant());
-        if (!(volume > 0.0) || !std::isfinite(volume))
-            throw InputError(grid_label(grid) + " has a transform that cannot be inverted");
-        inverse = linear.inverse();
-        const Vec3 edges = linear.colwise().norm();
-        const bool uniform = edges.maxCoeff() - edges.minCoeff() <= 1e-9 * edges.maxCoeff();
-        voxel_size = uniform ? edges[0] : std::cbrt(volume);
-    }
-    Vec3 to_world(const Vec3& index) const { return linear * index + shift; }
-    Vec3 to_index(const Vec3& world) const { return inverse * (world - shift); }
-    Vec3 gradient_to_world(const Vec3& index_gradient) const { return inverse.transpose() * index_gradient; }
-};
-
-/// Values at lattice nodes, through the leaves met lately: neighbouring leaves have places of their own.
-class NodeValues {
-public:
-    explicit NodeValues(const FloatTree& tree) : tree_(tree) {}
-
-    float at(const Coord& node) {
-        constexpr int kMask = kLeafDim - 1;
-        return leaf(node)[offset(node.x() & kMask, node.y() & kMask) + (node.z() & kMask)];
-    }
-
-    /// Those of N^3 nodes from `low` on. With N = 4 the columns at the corners of the first two axes are left
-    /// out.
-    template <int N>
-    void block(const Coord& low, float (&v)[N][N][N]) {
-        static_assert(N <= kLeafDim, "two leaves in a row hold all");
-        const Coord in_leaf = low & (kLeafDim - 1);
-        const float* leaves[2][2][2];
-        for (int a = 0; a <= (in_leaf.x() + N > kLeafDim); ++a)
-            for (int b = 0; b <= (in_leaf.y() + N > kLeafDim); ++b)
-                for (int c = 0; c <= (in_leaf.z() + N > kLeafDim); ++c)
-                    leaves[a][b][c] = leaf(low.offsetBy(kLeafDim * a, kLeafDim * b, kLeafDim * c));
-        const int here = std::min(N, kLeafDim - in_leaf.z());  // of each column, in the first leaf
-        for (int i = 0; i < N; ++i)
-            for (int j = 0; j < N; ++j) {
-                if (N == 4 && (i == 0 || i == 3) && (j == 0 || j == 3)) continue;
-                const int x = in_leaf.x() + i, y = in_leaf.y() + j;
-                const auto& column = leaves[x / kLeafDim][y / kLeafDim];
-                const int at = offset(x % kLeafDim, y % kLeafDim);
-                if (here == N) {
-                    std::memcpy(v[i][j], column[0] + at + in_leaf.z(), sizeof v[i][j]);
-                } else {
-                    for (int k = 0; k < here; ++k) v[i][j][k] = column[0][at + in_leaf.z() + k];
-                    for (int k = here; k < N; ++k) v[i][j][k] = column[1][at + k - here];
-                }
-            }
-    }
-
-private:
-    struct Place {
-        const float* values = nullptr;
-        Coord leaf;                     // in leaves
-        std::unique_ptr<float[]> tile;  // as many values as a leaf has, all the same
-    };
-
-    /// The values of the leaf that holds a node, or would.
-    const float* leaf(const Coord& node) {
-        const Coord at = node >> static_cast<int>(Leaf::LOG2DIM);
-        Place& place = places_[((at.x() & 3) << 4) | ((at.y() & 3) << 2) | (at.z() & 3)];
-        if (!place.values || place.leaf != at) fetch(node, at, place);
-        return place.values;
-    }
-    void fetch(const Coord& node, const Coord& at, Place& place) {
-        place.leaf = at;
-        if (const Leaf* found = tree_.probeConstLeaf(node)) {
-            place.values = found->buffer().data();
-            return;
-        }
-        if (!place.tile) place.tile = std::make_unique<float[]>(Leaf::SIZE);
-        std::fill_n(place.tile.get(), Leaf::SIZE, tree_.getValue(node));
-        place.values = place.tile.get();
-    }
-    static int offset(int x, int y) { return (x * kLeafDim + y) * kLeafDim; }
-
-    const FloatTree& tree_;
-    Place places_[64];
-};
-
-/// Values around one lattice cell. The cell's corners are (0..1)^3; the values one further out in each axis
-/// are those that the central differences at the corners need.
-class Stencil {
-public:
-    explicit Stencil(const FloatTree& tree) : nodes_(tree) {}
-
-    /// Of an ambiguous cell also without what joins its nodes, where that is farther on the same side, by up
-    /// to twice.
-    struct Value {
-        double joined, farther;
-    };
-    Value value(const Vec3& index) {
-        Vec3 t;
-        const Coord base = split(index, t);
-        float v[2][2][2];
-        nodes_.block(base, v);
-        const auto mix = [](double a, double b, double s) { return a + s * (b - a); };
-        double planes[2];
-        for (int i = 0; i < 2; ++i)
-            planes[i] = mix(mix(v[i][0][0], v[i][0][1], t.z()), mix(v[i][1][0], v[i][1][1], t.z()), t.y());
-        const double trilinear = mix(planes[0], planes[1], t.x());
-        if (!has_ambiguous_face(v)) return {trilinear, trilinear};
-        const double joined =
-            trilinear +
-            joining_correction([&](int i, int j, int k) { return nodes_.at(base.offsetBy(i, j, k)); }, t);
-        return {joined, is_farther(trilinear, joined) ? trilinear : joined};
-    }
-
-    /// Trilinear value, and the trilinear interpolation of the central differences at the corners, per voxel.
-    Surface::Sample sample(const Vec3& index) {
-        Vec3 t;
-        const Coord base = split(index, t);
-        float v[4][4][4];  // v[i + 1][j + 1][k + 1] at base + (i, j, k)
-        nodes_.block(base.offsetBy(-1), v);
-        const double w[3][2] = {{1.0 - t.x(), t.x()}, {1.0 - t.y(), t.y()}, {1.0 - t.z(), t.z()}};
-        Surface::Sample result{0.0, Vec3::Zero()};
-        for (int a = 0; a < 2; ++a)
-            for (int b = 0; b < 2; ++b) {
-                const double xy = w[0][a] * w[1][b], yz = w[1][a] * w[2][b], xz = w[0][a] * w[2][b];
-                const float* line = v[a + 1][b + 1];
-                result.value += xy * (w[2][0] * line[1] + w[2][1] * line[2]);
-                result.gradient.z() += xy * (w[2][0] * (line[2] - line[0]) + w[2][1] * (line[3] - line[1]));
-                result.gradient.x() += yz * (w[0][0] * (v[2][a + 1][b + 1] - v[0][a + 1][b + 1]) +
-                                             w[0][1] * (v[3][a + 1][b + 1] - v[1][a + 1][b + 1]));
-                result.gradient.y() += xz * (w[1][0] * (v[a + 1][2][b + 1] - v[a + 1][0][b + 1]) +
-                                             w[1][1] * (v[a + 1][3][b + 1] - v[a + 1][1][b + 1]));
-            }
-        result.gradient *= 0.5;
-        const float corners[2][2][2] = {{{v[1][1][1], v[1][1][2]}, {v[1][2][1], v[1][2][2]}},
-                                        {{v[2][1][1], v[2][1][2]}, {v[2][2][1], v[2][2][2]}}};
-        if (has_ambiguous_face(corners))
-            result.value +=
-                joining_correction([&](int i, int j, int k) { return v[i + 1][j + 1][k + 1]; }, t);
-        return result;
-    }
-
-private:
-    static bool is_farther(double trilinear, double joined) {
-        return (joined < 0.0) == (trilinear < 0.0) && std::abs(trilinear) > std::abs(joined) &&
-               std::abs(joined) > kNoLess * std::abs(trilinear);
-    }
-    static bool has_ambiguous_face(const float (&corners)[2][2][2]) {
-        unsigned inside = 0;
-        for (unsigned c = 0; c < 8; ++c)
-            inside |= static_cast<unsigned>(corners[c >> 2][c >> 1 & 1][c & 1] < 0.0f) << c;
-        return kHasAmbiguousFace[inside];
-    }
-    static Coord split(const Vec3& index, Vec3& t) {
-        // Points far outside any grid, or not finite, read the background at a corner of the representable
-        // range.
-        constexpr double kLimit = 1 << 30;
-        Coord base;
-        for (int axis = 0; axis < 3; ++axis) {
-            double x = index[axis];
-            if (!(std::abs(x) < kLimit)) x = x < 0.0 && std::isfinite(x) ? -kLimit : kLimit;
-            const int towards_zero = static_cast<int>(x);
-            base[axis] = towards_zero - (x < towards_zero);
-            t[axis] = x - base[axis];
-        }
-        return base;
-    }
-
-    NodeValues nodes_;
-};
+constexpr double kFewNodes = 0.25;  // of the active ones
+constexpr double kMostCut = 0.6;    // of the crossings, by the end of the band: shreds otherwise
 
 /// Length of the world gradient at the surface, away from the border; 0 when there is nothing to measure.
 struct Slope {
@@ -253,73 +55,6 @@ Slope slope_at_surface(const FloatTree& tree, const AffineMap& map,
     double sum = 0.0;
     for (const double slope : slopes) sum += std::min(slope, kSteepest * median);
     return {median, sum / static_cast<double>(slopes.size())};
-}
-
-/// World units per grid unit for a measured slope: exact where the unit is recognised.
-double value_scale_for(double slope, double voxel_size, bool level_set) {
-    // Central differences across sheets of a voxel or two are too short: what says it holds distances is
-    // believed for longer.
-    const double recognised = std::log(level_set ? 2.5 : 1.25);
-    if (!(slope > 0.0)) return 1.0;
-    const double off_world = std::abs(std::log(slope)), off_voxels = std::abs(std::log(slope * voxel_size));
-    if (std::min(off_world, off_voxels) > recognised) return 1.0 / slope;
-    return off_world <= off_voxels ? 1.0 : voxel_size;
-}
-
-/// A float copy with `sign * (value - iso)`, active tiles turned into voxels, and no value that is not
-/// finite.
-template <typename GridType>
-FloatGrid::Ptr float_copy(const GridType& source, double iso, double sign) {
-    using Value = typename GridType::ValueType;
-    const auto convert = [=](Value v) {
-        const double shifted = sign * (static_cast<double>(v) - iso);
-        if (std::isnan(shifted)) return std::numeric_limits<float>::max();
-        return static_cast<float>(std::clamp<double>(shifted, std::numeric_limits<float>::lowest(),
-                                                     std::numeric_limits<float>::max()));
-    };
-    const auto voxels = source.deepCopy();
-    voxels->tree().voxelizeActiveTiles();
-    auto copy = FloatGrid::create(convert(source.background()));
-    copy->setTransform(source.transform().copy());
-    copy->setTree(
-        std::make_shared<FloatTree>(voxels->tree(), convert(source.background()), openvdb::TopologyCopy()));
-    const auto source_accessor = source.getConstAccessor();
-    openvdb::tree::LeafManager<FloatTree> leaves(copy->tree());
-    leaves.foreach ([&](Leaf& leaf, std::size_t) {
-        auto reader = source.getConstUnsafeAccessor();
-        float* data = leaf.buffer().data();
-        for (openvdb::Index i = 0; i < Leaf::SIZE; ++i)
-            data[i] = convert(reader.getValue(leaf.offsetToGlobalCoord(i)));
-    });
-    // Inactive tiles keep the sign they had.
-    for (auto tile = copy->tree().beginValueOff(); tile; ++tile)
-        if (!tile.isVoxelValue()) tile.setValue(convert(source_accessor.getValue(tile.getCoord())));
-    return copy;
-}
-
-/// A dense block whose background says nothing: adds voxels around it so that the surface goes straight on
-/// past the block's last voxels and is cut by a flat cap one voxel beyond them.
-void cap_block(FloatGrid& grid, const openvdb::CoordBBox& block, double voxel) {
-    const auto outer =
-        openvdb::CoordBBox(block.min().offsetBy(-kCapLayers), block.max().offsetBy(kCapLayers));
-    const FloatGrid::ConstPtr inside = grid.deepCopy();
-    auto accessor = grid.getAccessor();
-    const auto reader = inside->getConstAccessor();
-    for (auto c = outer.begin(); c; ++c) {
-        Coord nearest = *c;
-        nearest.minComponent(block.max());
-        nearest.maxComponent(block.min());
-        // Distance to the cap in voxels: negative in front of it.
-        int depth = std::numeric_limits<int>::min();
-        for (int axis = 0; axis < 3; ++axis) {
-            const int past_top = (*c)[axis] - block.max()[axis] - 1,
-                      past_bottom = block.min()[axis] - 1 - (*c)[axis];
-            depth = std::max({depth, past_top, past_bottom});
-        }
-        const float cap = static_cast<float>(depth * voxel);
-        if (depth < -kCapLayers) continue;
-        accessor.setValue(*c, std::max(reader.getValue(nearest), cap));
-    }
 }
 
 }  // namespace
@@ -377,7 +112,7 @@ struct LevelSet::Impl {
 
         if (!own && scale != 1.0) grid = own = floats->deepCopy();
         if (own) {
-            normalise(*own, source->getGridClass());
+            to_world_distances(*own, scale, map.voxel_size);
             found = find_crossed_edges(own->constTree());
         }
         const double background = grid->background();
@@ -410,60 +145,6 @@ struct LevelSet::Impl {
         const auto floats = openvdb::gridConstPtrCast<FloatGrid>(source);
         return floats ? floats->tree().isValueOn(c)
                       : openvdb::gridConstPtrCast<openvdb::DoubleGrid>(source)->tree().isValueOn(c);
-    }
-
-    /// A float grid that can be sampled as it is, once its values are known to be world distances.
-    static bool is_plain(const FloatGrid& grid) {
-        const float background = grid.background();
-        if (!(background > 0.0f) || !std::isfinite(background) || grid.tree().activeTileCount() > 0)
-            return false;
-        openvdb::tree::LeafManager<const FloatTree> leaves(grid.constTree());
-        std::atomic<bool> finite{true};
-        leaves.foreach ([&](const Leaf& leaf, std::size_t) {
-            const float* data = leaf.buffer().data();
-            float sum =
-                0.0f;  // stays finite unless a value is not; leaves hold too few values to overflow otherwise
-            for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) sum += data[i] * 0.0f;
-            if (!(sum == 0.0f)) finite = false;
-        });
-        return finite;
-    }
-
-    /// World units, clamped, signs everywhere.
-    void normalise(FloatGrid& own, openvdb::GridClass) {
-        const float far = static_cast<float>(kFarVoxels * map.voxel_size);
-        const float factor = static_cast<float>(scale);
-        const float old_background = own.background();
-        // Zero stays zero and means outside: a block's background of 0 is mended below.
-        const auto convert = [=](float v) { return std::clamp(v * factor, -far, far); };
-        openvdb::tree::LeafManager<FloatTree> leaves(own.tree());
-        leaves.foreach ([&](Leaf& leaf, std::size_t) {
-            float* data = leaf.buffer().data();
-            for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) data[i] = convert(data[i]);
-        });
-        for (auto tile = own.tree().beginValueOff(); tile; ++tile)
-            if (!tile.isVoxelValue()) tile.setValue(convert(tile.getValue()));
-
-        const bool silent = !(old_background > 0.0f);
-        const float background = silent ? static_cast<float>(3.0 * map.voxel_size) : convert(old_background);
-        if (silent) {
-            const auto block = own.evalActiveVoxelBoundingBox();
-            const bool dense = own.activeVoxelCount() == block.volume();
-            set_outside(own, background);
-            if (dense && !block.empty())
-                cap_block(own, block, map.voxel_size);
-            else
-                openvdb::tools::signedFloodFill(own.tree());
-        } else if (background != old_background) {
-            own.tree().root().setBackground(background, /*updateChildNodes=*/false);
-        }
-        own.setGridClass(openvdb::GRID_LEVEL_SET);
-    }
-
-    /// Gives every inactive voxel and tile the value `outside`.
-    static void set_outside(FloatGrid& own, float outside) {
-        for (auto value = own.tree().beginValueOff(); value; ++value) value.setValue(outside);
-        own.tree().root().setBackground(outside, /*updateChildNodes=*/false);
     }
 };
 
@@ -501,76 +182,6 @@ std::optional<Surface::Diagonal> diagonal_beyond(const CrossedEdge& edge, int ot
     return diagonal;
 }
 
-class GridProbe final : public Surface::Probe {
-public:
-    GridProbe(const FloatTree& tree, const AffineMap& map, double band)
-        : Probe(kProjectionError * map.voxel_size, map.voxel_size), map_(map), stencil_(tree), band_(band) {}
-
-    double value(const Vec3& p) override { return stencil_.value(map_.to_index(p)).joined; }
-    double farther_value(const Vec3& p) override {
-        const double value = stencil_.value(map_.to_index(p)).farther;
-        return std::abs(value) < kInBand * band_ ? value : beyond_band(p, value);
-    }
-
-    Surface::Sample sample(const Vec3& p) override {
-        Surface::Sample s = stencil_.sample(map_.to_index(p));
-        s.gradient = map_.gradient_to_world(s.gradient);
-        return s;
-    }
-
-private:
-    /// Beyond the band values are all alike. There the distance is that to a point in the band and its value,
-    /// no less than the true one; least where that point lies on the shortest way, which its gradient
-    /// tells. Where the band is not near it is as far as distances are known.
-    double beyond_band(const Vec3& p, double value) {
-        constexpr double kLeastSlope = 0.05;
-        const double side = value < 0.0 ? -1.0 : 1.0;
-        const double length = kBeyondBand * band_;
-        double distance = length + band_;
-        const auto value_at = [&](const Vec3& q) {
-            return std::abs(stencil_.value(map_.to_index(q)).farther);
-        };
-        const auto try_at = [&](const Vec3& q) {
-            const double there = value_at(q);
-            if (!(there < kInBand * band_ && length + there < distance)) return false;
-            distance = length + there;
-            return true;
-        };
-        const auto aim_from = [&](const Vec3& from) {
-            constexpr int kAims = 2;
-            Vec3 gradient = sample(from).gradient;
-            bool any = false;
-            for (int aim = 0; aim < kAims && gradient.norm() > kLeastSlope; ++aim) {
-                const Vec3 q = p - side * length * gradient.normalized();
-                if (!try_at(q)) break;
-                any = true;
-                if (aim + 1 < kAims) gradient = sample(q).gradient;
-            }
-            return any;
-        };
-        // Next to the band some nodes of it are around; else it is looked for.
-        if (!aim_from(p)) {
-            Vec3 nearest = p;
-            double least = band_;
-            for (int axis = 0; axis < 3; ++axis)
-                for (const double step : {-length, length}) {
-                    const Vec3 q = p + step * Vec3::Unit(axis);
-                    const double there = value_at(q);
-                    if (!(there < least)) continue;
-                    least = there;
-                    nearest = q;
-                }
-            if (least < kInBand * band_) distance = length + least;
-            aim_from(nearest);
-        }
-        return side * distance;
-    }
-
-    const AffineMap& map_;
-    Stencil stencil_;
-    const double band_;
-};
-
 }  // namespace
 
 LevelSet::LevelSet(openvdb::GridBase::ConstPtr grid, const LevelSetOptions& options) {
@@ -586,7 +197,7 @@ double LevelSet::resolution() const {
     return impl_->map.voxel_size;
 }
 double LevelSet::reach() const {
-    return (kInBand + kBeyondBand) * impl_->band;
+    return GridProbe::reach(impl_->band);
 }
 double LevelSet::slope() const {
     return impl_->slope;
@@ -612,7 +223,7 @@ bool LevelSet::at_border(const Vec3& p) const {
 namespace {
 
 /// The edge in voxels, a power of two, of the largest cube that is no longer than `length`; from 1 to `most`.
-int cube_within(double length, double voxel, int most = kLeafDim) {
+int cube_within(double length, double voxel, int most = FloatTree::LeafNodeType::DIM) {
     int cube = 1;
     while (cube < most && 2 * cube * voxel <= length) cube *= 2;
     return cube;
