@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 
 #include "isotrack/types.h"
 
@@ -22,16 +23,27 @@ bool joins_diagonal(const Inside& inside) {
     return false;
 }
 
-/// Whether a cell has such a face, by the corners that are inside: bit 4 i + 2 j + k.
-inline const std::array<bool, 256> kHasAmbiguousFace = [] {
-    std::array<bool, 256> result{};
+/// The corners of a cell that are inside: bit 4 i + 2 j + k.
+inline unsigned inside_corners(const float (&v)[2][2][2]) {
+    unsigned inside = 0;
+    for (unsigned c = 0; c < 8; ++c)
+        inside |= static_cast<unsigned>(v[c >> 2][c >> 1 & 1][c & 1] < 0.0f) << c;
+    return inside;
+}
+
+/// The ambiguous faces of a cell by its corners that are inside: bit 2 axis + side.
+inline const std::array<std::uint8_t, 256> kAmbiguousFaces = [] {
+    constexpr unsigned kStep[] = {4, 2, 1};
+    std::array<std::uint8_t, 256> result{};
     for (unsigned mask = 0; mask < 256; ++mask)
-        for (const auto& [a, b, c] : {std::array{1u, 2u, 4u}, std::array{2u, 4u, 1u}, std::array{4u, 1u, 2u}})
-            for (const unsigned side : {0u, a}) {
-                const auto inside = [&](unsigned corner) { return (mask >> (side + corner) & 1u) != 0; };
-                if (inside(0) == inside(b + c) && inside(b) == inside(c) && inside(0) != inside(b))
-                    result[mask] = true;
-            }
+        for (unsigned face = 0; face < 6; ++face) {
+            const unsigned axis = face >> 1, b = kStep[(axis + 1) % 3], c = kStep[(axis + 2) % 3];
+            const auto inside = [&](unsigned corner) {
+                return (mask >> ((face & 1) * kStep[axis] + corner) & 1u) != 0;
+            };
+            if (inside(0) == inside(b + c) && inside(b) == inside(c) && inside(0) != inside(b))
+                result[mask] |= static_cast<std::uint8_t>(1u << face);
+        }
     return result;
 }();
 
@@ -46,40 +58,43 @@ bool joins_face(const At& at, int axis, int side) {
         i[(axis + 2) % 3] = w;
         return static_cast<double>(at(i[0], i[1], i[2])) < 0.0;
     };
-    const int turned = !inside(side, 0, 0);  // u counts from the other end
-    return joins_diagonal([&](int beyond, int u, int w) {
-        return inside(beyond == 0 ? side - 1 : side + 1, turned ? 1 - u : u, w);
+    const int turned = !inside(side, 0, 0);                // u counts from the other end
+    return joins_diagonal([&](int beyond, int u, int w) {  // which costs more to ask
+        return inside(beyond == 0 ? 1 - side : 3 * side - 1, turned ? 1 - u : u, w);
     });
 }
 
-/// What makes the trilinear value at t in such a cell join what volumeToMesh joins. Where they differ a face
-/// is interpolated on the two triangles along the diagonal of what is joined instead; into the cell that
-/// fades away linearly. 0 on the edges, continuous across faces. `at` as above.
+/// What makes the trilinear value at t in a cell join what volumeToMesh joins. Where they differ a face is
+/// interpolated on the two triangles along the diagonal of what is joined instead; into the cell that fades
+/// away linearly. 0 on the edges, continuous across faces. `v`: the values at the corners; `beyond` as `at`
+/// above, asked one step further out alone.
 template <typename At>
-double joining_correction(const At& at, const Vec3& t) {
+double joining_correction(const float (&v)[2][2][2], const At& beyond, const Vec3& t) {
+    const auto at = [&](int i, int j, int k) {
+        return ((i | j | k) & ~1) == 0 ? v[i][j][k] : beyond(i, j, k);
+    };
     double sum = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-        const int b = (axis + 1) % 3, c = (axis + 2) % 3;
-        for (const int side : {0, 1}) {
-            const auto value = [&](int u, int w) {
-                int i[3];
-                i[axis] = side;
-                i[b] = u;
-                i[c] = w;
-                return static_cast<double>(at(i[0], i[1], i[2]));
-            };
-            const int turned = !(value(0, 0) < 0.0);  // u counts from the other end
-            const double in0 = value(turned, 0), in1 = value(1 - turned, 1), out0 = value(1 - turned, 0),
-                         out1 = value(turned, 1);
-            if (!(in0 < 0.0 && in1 < 0.0 && out0 >= 0.0 && out1 >= 0.0)) continue;
-            const bool joined = joins_face(at, axis, side);
-            // Whether the trilinear value keeps its sign on the diagonal.
-            const double out = out0 + out1, in = in0 + in1;
-            if (joined ? out * out < 4.0 * in0 * in1 : in * in < 4.0 * out0 * out1) continue;
-            const double u = turned ? 1.0 - t[b] : t[b], w = joined ? t[c] : 1.0 - t[c],
-                         nearness = side == 0 ? 1.0 - t[axis] : t[axis], bulge = joined ? out - in : in - out;
-            sum -= nearness * bulge * std::min(u, w) * (1.0 - std::max(u, w));
-        }
+    const unsigned faces = kAmbiguousFaces[inside_corners(v)];
+    for (int face = 0; faces >> face != 0; ++face) {
+        if ((faces >> face & 1u) == 0) continue;
+        const int axis = face >> 1, side = face & 1, b = (axis + 1) % 3, c = (axis + 2) % 3;
+        const auto value = [&](int u, int w) {
+            int i[3];
+            i[axis] = side;
+            i[b] = u;
+            i[c] = w;
+            return static_cast<double>(v[i[0]][i[1]][i[2]]);
+        };
+        const int turned = !(value(0, 0) < 0.0);  // u counts from the other end
+        const double in0 = value(turned, 0), in1 = value(1 - turned, 1), out0 = value(1 - turned, 0),
+                     out1 = value(turned, 1);
+        const bool joined = joins_face(at, axis, side);
+        // Whether the trilinear value keeps its sign on the diagonal.
+        const double out = out0 + out1, in = in0 + in1;
+        if (joined ? out * out < 4.0 * in0 * in1 : in * in < 4.0 * out0 * out1) continue;
+        const double u = turned ? 1.0 - t[b] : t[b], w = joined ? t[c] : 1.0 - t[c],
+                     nearness = side == 0 ? 1.0 - t[axis] : t[axis], bulge = joined ? out - in : in - out;
+        sum -= nearness * bulge * std::min(u, w) * (1.0 - std::max(u, w));
     }
     return sum;
 }

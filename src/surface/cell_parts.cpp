@@ -55,7 +55,7 @@ const std::array<char, 256> kParts = [] {
 }();
 
 int parts_at(const Coord& cell, unsigned mask, TreeReader& reader) {
-    if (!kHasAmbiguousFace[mask]) return kParts[mask];
+    if (kAmbiguousFaces[mask] == 0) return kParts[mask];
     return parts_of(mask, [&](int axis, int side) {
         return joins_face([&](int i, int j, int k) { return reader.getValue(cell.offsetBy(i, j, k)); }, axis,
                           side);

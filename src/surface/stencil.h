@@ -32,10 +32,10 @@ public:
         for (int i = 0; i < 2; ++i)
             planes[i] = mix(mix(v[i][0][0], v[i][0][1], t.z()), mix(v[i][1][0], v[i][1][1], t.z()), t.y());
         const double trilinear = mix(planes[0], planes[1], t.x());
-        if (!has_ambiguous_face(v)) return {trilinear, trilinear};
+        if (kAmbiguousFaces[inside_corners(v)] == 0) return {trilinear, trilinear};
         const double joined =
-            trilinear +
-            joining_correction([&](int i, int j, int k) { return nodes_.at(base.offsetBy(i, j, k)); }, t);
+            trilinear + joining_correction(
+                            v, [&](int i, int j, int k) { return nodes_.at(base.offsetBy(i, j, k)); }, t);
         return {joined, is_farther(trilinear, joined) ? trilinear : joined};
     }
 
@@ -61,9 +61,9 @@ public:
         result.gradient *= 0.5;
         const float corners[2][2][2] = {{{v[1][1][1], v[1][1][2]}, {v[1][2][1], v[1][2][2]}},
                                         {{v[2][1][1], v[2][1][2]}, {v[2][2][1], v[2][2][2]}}};
-        if (has_ambiguous_face(corners))
-            result.value +=
-                joining_correction([&](int i, int j, int k) { return v[i + 1][j + 1][k + 1]; }, t);
+        if (kAmbiguousFaces[inside_corners(corners)] != 0)
+            result.value += joining_correction(
+                corners, [&](int i, int j, int k) { return v[i + 1][j + 1][k + 1]; }, t);
         return result;
     }
 
@@ -74,12 +74,6 @@ private:
     static bool is_farther(double trilinear, double joined) {
         return (joined < 0.0) == (trilinear < 0.0) && std::abs(trilinear) > std::abs(joined) &&
                std::abs(joined) > kNoLess * std::abs(trilinear);
-    }
-    static bool has_ambiguous_face(const float (&corners)[2][2][2]) {
-        unsigned inside = 0;
-        for (unsigned c = 0; c < 8; ++c)
-            inside |= static_cast<unsigned>(corners[c >> 2][c >> 1 & 1][c & 1] < 0.0f) << c;
-        return kHasAmbiguousFace[inside];
     }
     static openvdb::Coord split(const Vec3& index, Vec3& t) {
         // Points far outside any grid, or not finite, read the background at a corner of the representable
