@@ -64,15 +64,24 @@ bool joins_face(const At& at, int axis, int side) {
     });
 }
 
-/// What makes the trilinear value at t in a cell join what volumeToMesh joins. Where they differ a face is
-/// interpolated on the two triangles along the diagonal of what is joined instead; into the cell that fades
-/// away linearly. 0 on the edges, continuous across faces. `v`: the values at the corners; `beyond` as `at`
-/// above, asked one step further out alone.
+/// Those of a cell's ambiguous faces whose inside nodes volumeToMesh joins, as in `kAmbiguousFaces`. `v`: the
+/// values at the corners; `beyond` as `at` above, asked one step further out alone.
 template <typename At>
-double joining_correction(const float (&v)[2][2][2], const At& beyond, const Vec3& t) {
+unsigned joined_faces(const float (&v)[2][2][2], const At& beyond) {
     const auto at = [&](int i, int j, int k) {
         return ((i | j | k) & ~1) == 0 ? v[i][j][k] : beyond(i, j, k);
     };
+    const unsigned faces = kAmbiguousFaces[inside_corners(v)];
+    unsigned result = 0;
+    for (int face = 0; faces >> face != 0; ++face)
+        if ((faces >> face & 1u) != 0 && joins_face(at, face >> 1, face & 1)) result |= 1u << face;
+    return result;
+}
+
+/// What makes the trilinear value at t in a cell join what volumeToMesh joins. Where they differ a face is
+/// interpolated on the two triangles along the diagonal of what is joined instead; into the cell that fades
+/// away linearly. 0 on the edges, continuous across faces. `v` and `joined_ones`: see `joined_faces`.
+inline double joining_correction(const float (&v)[2][2][2], unsigned joined_ones, const Vec3& t) {
     double sum = 0.0;
     const unsigned faces = kAmbiguousFaces[inside_corners(v)];
     for (int face = 0; faces >> face != 0; ++face) {
@@ -88,7 +97,7 @@ double joining_correction(const float (&v)[2][2][2], const At& beyond, const Vec
         const int turned = !(value(0, 0) < 0.0);  // u counts from the other end
         const double in0 = value(turned, 0), in1 = value(1 - turned, 1), out0 = value(1 - turned, 0),
                      out1 = value(turned, 1);
-        const bool joined = joins_face(at, axis, side);
+        const bool joined = (joined_ones >> face & 1u) != 0;
         // Whether the trilinear value keeps its sign on the diagonal.
         const double out = out0 + out1, in = in0 + in1;
         if (joined ? out * out < 4.0 * in0 * in1 : in * in < 4.0 * out0 * out1) continue;

@@ -33,9 +33,7 @@ public:
             planes[i] = mix(mix(v[i][0][0], v[i][0][1], t.z()), mix(v[i][1][0], v[i][1][1], t.z()), t.y());
         const double trilinear = mix(planes[0], planes[1], t.x());
         if (kAmbiguousFaces[inside_corners(v)] == 0) return {trilinear, trilinear};
-        const double joined =
-            trilinear + joining_correction(
-                            v, [&](int i, int j, int k) { return nodes_.at(base.offsetBy(i, j, k)); }, t);
+        const double joined = trilinear + joining_correction(v, joined_in(base, v), t);
         return {joined, is_farther(trilinear, joined) ? trilinear : joined};
     }
 
@@ -62,8 +60,7 @@ public:
         const float corners[2][2][2] = {{{v[1][1][1], v[1][1][2]}, {v[1][2][1], v[1][2][2]}},
                                         {{v[2][1][1], v[2][1][2]}, {v[2][2][1], v[2][2][2]}}};
         if (kAmbiguousFaces[inside_corners(corners)] != 0)
-            result.value += joining_correction(
-                corners, [&](int i, int j, int k) { return v[i + 1][j + 1][k + 1]; }, t);
+            result.value += joining_correction(corners, joined_in(base, corners), t);
         return result;
     }
 
@@ -74,6 +71,15 @@ private:
     static bool is_farther(double trilinear, double joined) {
         return (joined < 0.0) == (trilinear < 0.0) && std::abs(trilinear) > std::abs(joined) &&
                std::abs(joined) > kNoLess * std::abs(trilinear);
+    }
+    /// `joined_faces` of an ambiguous cell: those met lately are kept, by where they are among their
+    /// neighbours.
+    unsigned joined_in(const openvdb::Coord& cell, const float (&v)[2][2][2]) {
+        JoinedFaces& kept = joined_[((cell.x() & 3) << 4) | ((cell.y() & 3) << 2) | (cell.z() & 3)];
+        if (!kept.known || kept.cell != cell)
+            kept = {cell, true,
+                    joined_faces(v, [&](int i, int j, int k) { return nodes_.at(cell.offsetBy(i, j, k)); })};
+        return kept.faces;
     }
     static openvdb::Coord split(const Vec3& index, Vec3& t) {
         // Points far outside any grid, or not finite, read the background at a corner of the representable
@@ -90,7 +96,13 @@ private:
         return base;
     }
 
+    struct JoinedFaces {
+        openvdb::Coord cell;
+        bool known = false;
+        unsigned faces = 0;
+    };
     NodeValues nodes_;
+    JoinedFaces joined_[64];
 };
 
 }  // namespace isotrack
