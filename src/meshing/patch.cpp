@@ -286,7 +286,8 @@ PatchSource::PatchSource(TriangleMesh mesh, double spacing)
       spacing_(spacing),
       bins_(mesh_.points, mesh_.triangles, spacing),
       normal_(mesh_.points.size(), Vec3::Zero()),
-      beside_(mesh_.points.size(), kNotLookedFor) {
+      beside_(mesh_.points.size()) {
+    forget();
     for (const Triangle& t : mesh_.triangles)
         for (const int v : t) normal_[v] += area(t, mesh_.points);
     for (Vec3& n : normal_) n.normalize();
@@ -297,7 +298,7 @@ void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBi
     const double farthest = kMargin * spacing_;
     tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t i) {
         const int v = vertices[i];
-        if (beside_[v] != kNotLookedFor) return;
+        if (beside(v) != kNotLookedFor) return;
         const Vec3& p = mesh_.points[v];
         double nearest[2] = {kFar, kFar};
         int at[2] = {-1, -1};  // the nearest that faces another way, and the same way
@@ -315,12 +316,12 @@ void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBi
             [&](double distance) {
                 return nearest[1] <= distance * distance || (at[0] >= 0 && distance >= farthest);
             });
-        beside_[v] = at[1] >= 0 ? at[1] : at[0];
+        beside_[v].store(at[1] >= 0 ? at[1] : at[0], std::memory_order_relaxed);
     });
 }
 
 void PatchSource::forget() {
-    std::fill(beside_.begin(), beside_.end(), kNotLookedFor);
+    for (auto& beside : beside_) beside.store(kNotLookedFor, std::memory_order_relaxed);
 }
 
 std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh) {

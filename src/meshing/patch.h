@@ -1,6 +1,7 @@
 // A part of a mesh exchanged for that of another mesh of the same surface.
 #pragma once
 
+#include <atomic>
 #include <optional>
 #include <vector>
 
@@ -17,8 +18,8 @@ struct Patch {
     long components = 0, euler = 0;   ///< How much more of them there are in what comes than in what goes.
 };
 
-/// The mesh that patches come from. It remembers what it finds of the one they are for: not for threads to
-/// share.
+/// The mesh that patches come from. It remembers what it finds of the one they are for. Threads may share it,
+/// but for `forget`.
 class PatchSource {
 public:
     /// `spacing`: the length of an edge. Closed and manifold around what will go.
@@ -33,7 +34,7 @@ public:
     /// Finds, by several threads, for each of some vertices the triangle of `mesh` that is nearest, among
     /// those that face the same way if any of them is near; -1 if there is none.
     void look_beside(const std::vector<int>& vertices, const TriangleBins& mesh);
-    int beside(int vertex) const { return beside_[vertex]; }  ///< As found.
+    int beside(int vertex) const { return beside_[vertex].load(std::memory_order_relaxed); }  ///< As found.
     /// `mesh` is another now.
     void forget();
 
@@ -42,7 +43,7 @@ private:
     double spacing_;
     TriangleBins bins_;
     std::vector<Vec3> normal_;
-    std::vector<int> beside_;
+    std::vector<std::atomic<int>> beside_;  // whoever looks finds the same
 };
 
 /// The triangles of a mesh within `reach` of a place, and those around where their border would be pinched.
@@ -50,10 +51,10 @@ private:
 std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh);
 
 /// `gone`, with a border that is pinched nowhere, goes. The triangles of `source` that are nearest to them
-/// come, less a seam about as wide as its spacing; strips of triangles that face as the source does, if any do, fill
-/// the seam from each loop of the one border to one of the other, and what they cross of what comes is left out.
-/// nullopt where the loops do not match. The mesh must be closed and manifold, and so is what it becomes, but
-/// for edges that it may have twice; it may cross itself.
+/// come, less a seam about as wide as its spacing; strips of triangles that face as the source does, if any
+/// do, fill the seam from each loop of the one border to one of the other, and what they cross of what comes
+/// is left out. nullopt where the loops do not match. The mesh must be closed and manifold, and so is what it
+/// becomes, but for edges that it may have twice; it may cross itself.
 std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source);
 
 }  // namespace isotrack

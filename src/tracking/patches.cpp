@@ -1,5 +1,7 @@
 #include "tracking/patches.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -138,11 +140,13 @@ std::vector<Vec3> doubtful(const std::vector<Vec3>& places, const FrameMesh& mes
     const double resolution = surface.resolution();
     PatchSource lattice(surface.lattice_mesh(places, 4.0 * kSmall * resolution), resolution);
     const TriangleBins bins(mesh.vertices, mesh.carved.triangles, resolution);
-    std::vector<Vec3> result;
-    for (const Vec3& place : places) {
-        const auto patch = patch_for(triangles_around(place, kSmall * resolution, bins), bins, lattice);
-        if (!patch || patch->euler != 0 || patch->components != 0) result.push_back(place);
-    }
+    std::vector<char> doubt(places.size());
+    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
+        const auto patch = patch_for(triangles_around(places[p], kSmall * resolution, bins), bins, lattice);
+        doubt[p] = !patch || patch->euler != 0 || patch->components != 0;
+    });
+    std::vector<Vec3> result = places;
+    compact(result, doubt);
     return result;
 }
 
