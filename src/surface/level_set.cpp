@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "component_boxes.h"
 #include "find_in_blocks.h"
@@ -57,6 +58,27 @@ Slope slope_at_surface(const FloatTree& tree, const AffineMap& map,
     return {median, sum / static_cast<double>(slopes.size())};
 }
 
+/// How deep inside values are known: less than what inactive nodes there have for a value. Infinite where
+/// there are none.
+double depth_inside(const FloatTree& tree) {
+    using Leaf = FloatTree::LeafNodeType;
+    constexpr openvdb::Index kLast = Leaf::DIM - 1;
+    double result = std::numeric_limits<double>::infinity();
+    const auto take = [&](float value) {
+        if (value < 0.0f) result = std::min(result, -static_cast<double>(value));
+    };
+    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
+        for (openvdb::Index corner = 0; corner < 8; ++corner) {  // one of them is where any is, nearly always
+            const openvdb::Index n = ((corner >> 2) * kLast << 2 * Leaf::LOG2DIM) |
+                                     ((corner >> 1 & 1) * kLast << Leaf::LOG2DIM) | (corner & 1) * kLast;
+            if (!leaf->isValueOn(n)) take(leaf->getValue(n));
+        }
+    auto tile = tree.cbeginValueOff();
+    tile.setMaxDepth(FloatTree::ValueOffCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) take(*tile);
+    return result;
+}
+
 }  // namespace
 
 struct LevelSet::Impl {
@@ -103,8 +125,8 @@ struct LevelSet::Impl {
                 grid_label(*source) + " is not a level set: its values do not change sign around " +
                 std::to_string(options.iso) + " (class '" + openvdb::GridBase::gridClassToString(grid_class) +
                 "'); give an iso value inside its range");
-        refuse_beyond_band(options.iso, found);
         const Slope in_grid_units = slope_at_surface(grid->constTree(), map, found.edges);
+        refuse_beyond_band(options.iso, found, in_grid_units.median * map.voxel_size);
         scale = value_scale_for(in_grid_units.median, map.voxel_size, grid_class == openvdb::GRID_LEVEL_SET);
         if (in_grid_units.mean > 0.0) slope = std::min(1.0, scale * in_grid_units.mean);
         border_crossings = static_cast<std::size_t>(
@@ -115,8 +137,8 @@ struct LevelSet::Impl {
             to_world_distances(*own, scale, map.voxel_size);
             found = find_crossed_edges(own->constTree());
         }
-        const double background = grid->background();
-        band = std::clamp(background, map.voxel_size, kFarVoxels * map.voxel_size);
+        band = std::clamp(std::min<double>(grid->background(), depth_inside(grid->constTree())),
+                          map.voxel_size, kFarVoxels * map.voxel_size);
         crossed = std::move(found);
         bounds = tbb::parallel_reduce(
             tbb::blocked_range<std::size_t>(0, crossed.edges.size(), 4096), Box(),
@@ -129,12 +151,22 @@ struct LevelSet::Impl {
     }
 
     /// \throws InputError where the band ends before the iso value: the surface would be the band's.
-    void refuse_beyond_band(double iso, const CrossedEdges& found) const {
+    /// `step`: how much values change in a voxel, about.
+    void refuse_beyond_band(double iso, const CrossedEdges& found, double step) const {
+        constexpr double kNear = 1.5;  // steps
         if (iso == 0.0 || active_voxels == 0 || source->getGridClass() != openvdb::GRID_LEVEL_SET) return;
-        const double end = grid->background() + iso;
-        const auto cut = std::count_if(found.edges.begin(), found.edges.end(),
-                                       [](const CrossedEdge& edge) { return edge.at_border; });
-        if ((end > 0.0 && std::abs(iso) >= end) ||
+        const double end = grid->background() + iso;  // outside; that inside is not known
+        if (!(end > 0.0)) return;
+        // Where it runs into the border of a block, values jump.
+        const auto reader = grid->getConstAccessor();
+        const auto is_cut = [&](const CrossedEdge& edge) {
+            if (!edge.at_border) return false;
+            Coord to = edge.from;
+            ++to[edge.axis];
+            return std::abs(reader.getValue(is_active(edge.from) ? to : edge.from)) < kNear * step;
+        };
+        const auto cut = std::count_if(found.edges.begin(), found.edges.end(), is_cut);
+        if (iso >= end || (found.edges.empty() && -iso >= end) ||
             static_cast<double>(cut) > kMostCut * static_cast<double>(found.edges.size()))
             throw InputError(grid_label(*source) + " has no room in its band for the iso value " +
                              std::to_string(iso) + ": the background is " + std::to_string(end) +
@@ -222,10 +254,12 @@ bool LevelSet::at_border(const Vec3& p) const {
 }
 namespace {
 
-/// The edge in voxels, a power of two, of the largest cube that is no longer than `length`; from 1 to `most`.
+/// The edge in voxels, a power of two, of the largest cube that is no longer than about `length`; from 1 to
+/// `most`.
 int cube_within(double length, double voxel, int most = FloatTree::LeafNodeType::DIM) {
+    constexpr double kRounded = 1.001;  // lengths may be given in few digits
     int cube = 1;
-    while (cube < most && 2 * cube * voxel <= length) cube *= 2;
+    while (cube < most && 2 * cube * voxel <= kRounded * length) cube *= 2;
     return cube;
 }
 

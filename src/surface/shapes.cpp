@@ -346,6 +346,7 @@ private:
               back_(surface.motion_.inverse()) {}
 
         double value(const Vec3& p) override { return inner_->value(back_ * p); }
+        double farther_value(const Vec3& p) override { return inner_->farther_value(back_ * p); }
         Sample sample(const Vec3& p) override {
             const Sample at = inner_->sample(back_ * p);
             return {at.value, forward_.linear() * at.gradient};
@@ -406,6 +407,11 @@ private:
         }
 
         double value(const Vec3& p) override { return parts_[lowest(p)]->value(p); }
+        double farther_value(const Vec3& p) override {
+            double least = parts_.front()->farther_value(p);
+            for (const auto& part : parts_) least = std::min(least, part->farther_value(p));
+            return least;
+        }
         Sample sample(const Vec3& p) override { return parts_[lowest(p)]->sample(p); }
         std::optional<Vec3> project(const Vec3& p) override {
             std::optional<Vec3> best;

@@ -3,10 +3,12 @@
 #include <openvdb/tools/LevelSetSphere.h>
 #include <openvdb/tools/LevelSetUtil.h>
 
+#include <algorithm>
 #include <string>
 
 #include "isotrack/error.h"
 #include "isotrack/surface/level_set.h"
+#include "support/dense_block.h"
 #include "support/unit_sphere.h"
 
 namespace isotrack {
@@ -82,6 +84,59 @@ TEST(IsoValue, IsRefusedWhereTheBandEnds) {
             for (const Vec3& direction : near_sphere(300, 0.0))
                 EXPECT_NEAR(probe->value((1.0 + voxels * kVoxel) * direction), 0.0, kBound);
         }
+    }
+}
+
+TEST(IsoValue, IsTakenWhereTheInsideIsKnownFarther) {
+    // Three voxels outside, ten inside.
+    const auto grid = openvdb::FloatGrid::create(3.0f * kVoxel);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(kVoxel));
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    auto accessor = grid->getAccessor();
+    for (auto c = openvdb::CoordBBox(openvdb::Coord(-24), openvdb::Coord(24)).begin(); c; ++c) {
+        const double d = kVoxel * (*c).asVec3d().length() - 1.0;
+        if (d > 3.0 * kVoxel) continue;
+        if (d > -10.0 * kVoxel)
+            accessor.setValue(*c, static_cast<float>(d));
+        else
+            accessor.setValueOff(*c, static_cast<float>(-10.0 * kVoxel));
+    }
+    const LevelSet level_set(grid, {-5.0 * kVoxel});
+    const auto probe = level_set.probe();
+    for (const Vec3& direction : near_sphere(300, 0.0))
+        EXPECT_NEAR(probe->value(0.75 * direction), 0.0, kBound);
+    EXPECT_THROW(LevelSet(grid, {-9.9 * kVoxel}), InputError);
+    EXPECT_THROW(LevelSet(grid, {2.9 * kVoxel}), InputError);
+}
+
+TEST(IsoValue, IsTakenInBlocksThatSayNothingOfTheOutside) {
+    const Vec3 centre(0.8, 0.8, 0.8);
+    const auto block =
+        support::dense_block(32, kVoxel, [&](const Vec3& p) { return (p - centre).norm() - 0.5; });
+    const LevelSet ball(block, {0.1});
+    const auto of_ball = ball.probe();
+    for (const Vec3& direction : near_sphere(300, 0.0))
+        EXPECT_NEAR(of_ball->value(centre + 0.6 * direction), 0.0, 2.0 * kBound);
+    // A shallow pool, to all sides as far as the block goes: most of its surface is the border.
+    const auto pool = support::dense_block(20, kVoxel, [](const Vec3& p) { return p.z() - 0.12; });
+    openvdb::tools::changeBackground(pool->tree(), 3.0f * static_cast<float>(kVoxel));
+    for (const double iso : {-0.01, 0.01}) {
+        const LevelSet water(pool, {iso});
+        EXPECT_NEAR(water.probe()->value({0.5, 0.5, 0.12 + iso}), 0.0, 1e-6);
+        EXPECT_GT(water.border_crossings(), 0u);
+    }
+}
+
+TEST(IsoValue, LeavesLessOfTheBandOnOneSide) {
+    // A tolerance must not be larger than what is known on either.
+    for (const double voxels : {-1.25, 1.25}) {
+        const LevelSet level_set(unit_sphere(3.0f), {voxels * kVoxel});
+        EXPECT_GT(level_set.reach(), kVoxel);
+        const auto probe = level_set.probe();
+        for (const Vec3& direction : near_sphere(100, 0.0))
+            for (const double r : {0.1, 0.5, 1.5, 1.9})
+                EXPECT_GE(std::abs(probe->farther_value(r * direction)),
+                          std::min(level_set.reach(), std::abs(r - 1.0 - voxels * kVoxel)) - 0.15 * kVoxel);
     }
 }
 

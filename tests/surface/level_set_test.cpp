@@ -21,11 +21,13 @@
 #include "isotrack/io/vdb_file.h"
 #include "isotrack/surface/rasterise.h"
 #include "isotrack/surface/shapes.h"
+#include "support/dense_block.h"
 #include "support/unit_sphere.h"
 
 namespace isotrack {
 namespace {
 
+using support::dense_block;
 using support::near_sphere;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -373,21 +375,6 @@ TEST(LevelSet, ReadsHalfFloatsFromAFile) {
         EXPECT_LT((probe->sample(p).gradient - p.normalized()).norm(), 2 * h * h + 3e-3);
     }
     EXPECT_EQ(level_set.value_scale(), 1.0);
-}
-
-/// A dense block 0..n-1 in each axis, class level set, background 0, made of a function of the world
-/// position.
-template <typename Function>
-openvdb::FloatGrid::Ptr dense_block(int n, double voxel, const Function& value) {
-    auto grid = openvdb::FloatGrid::create(0.0f);
-    grid->setTransform(uniform(voxel));
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
-    auto accessor = grid->getAccessor();
-    for (auto c = openvdb::CoordBBox(openvdb::Coord(0), openvdb::Coord(n - 1)).begin(); c; ++c) {
-        const auto p = grid->indexToWorld(*c);
-        accessor.setValue(*c, static_cast<float>(value(Vec3(p.x(), p.y(), p.z()))));
-    }
-    return grid;
 }
 
 TEST(LevelSet, ReadsADenseBlockWithFarValues) {

@@ -5,11 +5,14 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "isotrack/error.h"
+#include "isotrack/surface/level_set.h"
+#include "isotrack/surface/rasterise.h"
 
 namespace isotrack {
 namespace {
@@ -288,6 +291,23 @@ TEST(Shapes, UnionProjectsOnlyToItsOwnSurface) {
         const auto p = probe->project(q);
         if (!p) continue;
         EXPECT_NEAR(probe->value(*p), 0.0, 1e-6) << q.transpose();
+    }
+}
+
+TEST(Shapes, PassOnWhatAGridKnowsBeyondItsBand) {
+    const double h = 0.05;
+    const auto ball = std::make_shared<const LevelSet>(rasterise(*shapes::sphere({0, 0, 0}, 1.0, h), h));
+    Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+    motion.translate(Vec3(4.0, 0.0, 0.0)).rotate(Eigen::AngleAxisd(0.7, Vec3::UnitZ()));
+    const auto moved = shapes::moved(ball, motion), both = shapes::unite({ball, moved});
+    const auto of_moved = moved->probe(), of_both = both->probe();
+    for (const auto& surface : {moved, both}) EXPECT_NEAR(surface->reach(), ball->reach(), 1e-12);
+    for (const double beyond : {-4.0, -2.0, 2.0, 4.0, 20.0}) {
+        const Vec3 from_middle = (1.0 + beyond * h) * Vec3(0.6, 0.0, 0.8);
+        const double least = std::min(std::abs(beyond) * h, ball->reach()) - 0.15 * h;
+        EXPECT_GE(std::abs(of_moved->farther_value(motion * from_middle)), least) << beyond;
+        EXPECT_GE(std::abs(of_both->farther_value(from_middle)), least) << beyond;
+        EXPECT_GE(std::abs(of_both->farther_value(motion * from_middle)), least) << beyond;
     }
 }
 
