@@ -61,13 +61,18 @@ void update_labels(CellLabels& labels, const std::vector<int>& changed, const Te
             const Vec3 e1 = points[v[1]] - p0, e2 = points[v[2]] - p0, e3 = points[v[3]] - p0;
             const Vec3 centroid = p0 + 0.25 * (e1 + e2 + e3);
             double value = probe.value(centroid);
-            if (one_sheet && std::abs(value) < far) {
+            double depth = std::abs(value);
+            const bool deep = one_sheet && depth >= resolution && depth < far;
+            if (deep) depth = std::abs(probe.farther_value(centroid));
+            if (one_sheet && depth < far) {
                 Vec3 centre;
                 const bool flat = !circumcentre(e1, e2, e3, centre);
                 const double at_centre = flat ? 0.0 : probe.value(p0 + centre);
-                // The gradient is dear, and matters only where the two do not agree.
+                // The gradient is dear, and matters only where the two do not agree. Beyond the band of a
+                // grid there is none.
+                const bool beyond_band = deep && depth > std::abs(value);
                 if ((flat || (at_centre < 0.0) != (value < 0.0)) &&
-                    (std::abs(value) >= resolution || probe.sample(centroid).gradient.norm() > kClear)) {
+                    (beyond_band || probe.sample(centroid).gradient.norm() > kClear)) {
                     if (flat) {
                         labels[c] = kFlat;
                         continue;

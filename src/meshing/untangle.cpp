@@ -6,6 +6,8 @@
 #include <limits>
 #include <tuple>
 
+#include "surface/far_value.h"
+
 namespace isotrack {
 namespace {
 
@@ -133,7 +135,8 @@ bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec
             const auto& v = cells.vertices[c];
             if (cells.is_infinite(c)) return Run{std::numeric_limits<double>::infinity(), {}};
             const Vec3 centroid = 0.25 * (points[v[0]] + points[v[1]] + points[v[2]] + points[v[3]]);
-            run.certainty = std::max(run.certainty, std::abs(probe->value(centroid)));
+            run.certainty =
+                std::max(run.certainty, std::abs(far_value(*probe, centroid, surface.resolution())));
         }
         return run;
     };

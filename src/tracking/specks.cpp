@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "sampling/compact.h"
+#include "surface/far_value.h"
 #include "tracking/cell_centroid.h"
 
 namespace isotrack {
@@ -34,7 +35,8 @@ std::set<int> inside_with(int cell, const CellLabels& labels, const Tetrahedra& 
 /// The outside cells on the way from a part to any other inside cell on which the largest distance outside is
 /// least, then their number; none if there is no way within `farthest`.
 std::vector<int> way_from(const std::set<int>& part, const CellLabels& labels, const Tetrahedra& cells,
-                          const Particles& particles, Surface::Probe& probe, double farthest) {
+                          const Particles& particles, const Surface& surface, double farthest) {
+    const auto probe = surface.probe();
     struct Step {
         double distance;
         int steps, cell, from;
@@ -48,7 +50,8 @@ std::vector<int> way_from(const std::set<int>& part, const CellLabels& labels, c
         for (int k = 0; k < 4; ++k) {
             const int next = cells.neighbour(cell, k);
             if (labels[next] != 0 || cells.is_infinite(next) || from.count(next) > 0) continue;
-            const double distance = std::max(so_far, probe.value(centroid_of(next, cells, particles)));
+            const double distance = std::max(
+                so_far, far_value(*probe, centroid_of(next, cells, particles), surface.resolution()));
             if (distance <= farthest) open.push({distance, steps + 1, next, steps == 0 ? -1 : cell});
         }
     };
@@ -142,7 +145,6 @@ bool any(const std::vector<char>& flags) {
 
 std::size_t join_specks(MeshTrials& trials, CellLabels& labels, const Carve& carve, const Tetrahedra& cells,
                         const Particles& particles, const Surface& surface, const SizingLimits& limits) {
-    const auto probe = surface.probe();
     // Those that something is near to which is missed without all of them.
     const auto needed = [&] {
         std::vector<char> specks = trials.inspection().topology.speck, removed = specks;
@@ -156,7 +158,7 @@ std::size_t join_specks(MeshTrials& trials, CellLabels& labels, const Carve& car
     const auto join = [&](const std::set<int>& part) {
         const MeshTopology now = topology_of(trials.mesh());
         CellLabels changed = labels;
-        const auto way = way_from(part, changed, cells, particles, *probe, limits.tolerance);
+        const auto way = way_from(part, changed, cells, particles, surface, limits.tolerance);
         if (way.empty()) return false;
         for (const int c : way) changed[c] = 1;
         FrameMesh other = carve(changed);

@@ -25,10 +25,10 @@ using CellLabels = std::vector<char>;
 ///   is coherent among the slivers that lie on the sheet;
 /// - any other cell spans two sheets, a thin solid or a gap, where the circumcentre may lie beyond the far
 ///   sheet: it is inside when its centroid is. So is a cell where the gradient is short, since sheets less
-///   than a voxel apart blur each other's normals, and one with its centroid a detail or more from the
-///   surface, which no sliver on a sheet has.
-/// A cell too flat to have a circumcentre takes the label of the cell it flows to. `detail`: at least two
-/// tolerances and the surface's resolution, which it is when unset.
+///   than a voxel apart blur each other's normals (but not beyond the band of a grid, where there is no
+///   gradient), and one with its centroid a detail or more from the surface, which no sliver on a sheet has.
+/// A cell too flat to have a circumcentre takes the label of the cell it flows to. `detail`: what is smaller
+/// need not be seen, the surface's resolution or more, as that when unset.
 CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& points,
                              const std::vector<Vec3>& normals, const Surface& surface,
                              std::optional<double> detail = {});
