@@ -46,7 +46,7 @@ std::shared_ptr<const Surface> make_surface(const std::string& shape, double vox
 
 /// Wanted spacing the same everywhere.
 SizingLimits uniform(double spacing) {
-    return {0.1 * spacing, 1.0, spacing, spacing};
+    return {0.1 * spacing, 1.0, spacing, spacing, spacing};
 }
 
 /// Particles on a surface and what the stages make of them.

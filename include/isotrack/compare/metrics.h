@@ -11,7 +11,7 @@ namespace isotrack {
 
 /// Distances in voxels of the level set. "To": from the mesh to the level set, |phi| at 28 points of each
 /// triangle (a regular lattice of barycentric coordinates in sixths, corners included), RMS weighted by area;
-/// farther out than the level set's band it tells the band's half width. "From": from the level set to the
+/// where the level set's `reach()` ends it tells no more. "From": from the level set to the
 /// mesh, the distance to the nearest triangle of every lattice edge crossing, projected on the surface. The
 /// symmetric error is the larger of both.
 struct MeshMetrics {

@@ -14,6 +14,7 @@ struct SizingLimits {
     double tolerance;           ///< Of values at the mesh: less than of distances where the slope is.
     double angle;               ///< Largest angle between the normals of neighbours.
     double min_edge, max_edge;  ///< The spacing stays between these.
+    double detail;              ///< What is smaller need not be seen: the surface's resolution, or more.
     double angle_floor =
         0.0;  ///< The angle alone asks for no spacing below this: at a sharp edge it would never be met.
     /// Whether the mean square counts beside the number of particles. Then a smaller error is aimed at where
@@ -21,7 +22,6 @@ struct SizingLimits {
     /// tenth of them have hardly any error, being there only because the spacing must not jump from small to
     /// large, everywhere: down to 0.35 where about half of them have none.
     bool mean_square_counts = false;
-    double detail = 0.0;    ///< What is smaller need not be looked at: the surface's resolution, or more.
     double thinning = 0.5;  ///< Least factor of 1/h^2 in one update: near 1 a population thins out slowly.
 };
 
