@@ -15,6 +15,7 @@
 #include "isotrack/error.h"
 #include "surface/affine_map.h"
 #include "surface/ambiguous_faces.h"
+#include "surface/crossed_components.h"
 #include "surface/crossed_edges.h"
 #include "surface/grid_probe.h"
 #include "surface/grid_values.h"
@@ -335,6 +336,9 @@ std::optional<long> LevelSet::lattice_euler() const {
     // A vertex for each part of a cell, a quadrangle for each crossed edge, and two edges for every
     // quadrangle.
     return impl_->crossed.cell_parts - static_cast<long>(impl_->crossed.edges.size());
+}
+std::optional<std::size_t> LevelSet::lattice_component_count() const {
+    return count_components(impl_->crossed, impl_->grid->constTree());
 }
 std::optional<std::vector<Box>> LevelSet::lattice_components() const {
     std::vector<openvdb::Vec3s> points;

@@ -28,7 +28,6 @@ constexpr double kAround = 2.5;  // the middles of other patches for what fails
 constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
 constexpr double kLatticeReach = 24.0;
 constexpr double kFlat = 1e-3;  // twice the area over the square of the longest edge
-constexpr std::size_t kFewPlaces = 4;
 constexpr std::size_t kMostFailing = 64, kMostPlaces = 300;
 constexpr int kMostPatches = 1000, kMostRefused = 50;  // that are made, and whose meshes are inspected
 constexpr std::size_t kMostTriangles = 10000000;       // of the whole meshes they make
@@ -223,20 +222,19 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     std::vector<Vec3> places =
         suspicious_places(trials.mesh(), trials.inspection().topology, thickness, resolution);
     const auto euler = surface.lattice_euler();
-    if (!euler) return 0;
-    if (euler_of(trials.mesh()) == *euler &&
-        (places.size() <= kFewPlaces && doubtful(places, trials.mesh(), surface).empty()))
-        return 0;
-    const auto wanted = surface.lattice_components();
-    if (!wanted) return 0;
+    if (!euler || (places.empty() && euler_of(trials.mesh()) == *euler)) return 0;
+    const auto count_wanted = surface.lattice_component_count();
+    if (!count_wanted) return 0;
     // Components and handles that are too many or too few.
     const auto astray = [&](const MeshTopology& topology) {
-        const long components = static_cast<long>(topology.components) - static_cast<long>(wanted->size()),
+        const long components = static_cast<long>(topology.components) - static_cast<long>(*count_wanted),
                    handles = components - (topology.euler - *euler) / 2;
         return std::abs(components) + std::abs(handles);
     };
     long now = astray(topology_of(trials.mesh()));
     if (now == 0) return 0;
+    const auto wanted = surface.lattice_components();
+    if (!wanted) return 0;
     std::vector<Vec3> likely = doubtful(places, trials.mesh(), surface);
     const std::vector<Vec3> unmatched = unmatched_components(trials.mesh(), *wanted, resolution);
     for (auto* some : {&likely, &places}) {

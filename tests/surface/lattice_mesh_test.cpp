@@ -59,6 +59,7 @@ void expect_as_volume_to_mesh(const LevelSet& level_set) {
     EXPECT_EQ(ours.components, theirs.components);
     EXPECT_EQ(ours.euler, theirs.euler);
     EXPECT_EQ(level_set.lattice_euler(), theirs.euler);
+    EXPECT_EQ(level_set.lattice_component_count(), theirs.components);
     const auto components = level_set.lattice_components();
     ASSERT_TRUE(components.has_value());
     EXPECT_EQ(components->size(), theirs.components);

@@ -51,7 +51,8 @@ public:
     std::vector<Crossing> crossings_near(const std::vector<Vec3>& places, double reach) const override;
     std::vector<Eigen::Vector3i> upright_crossings() const override;
     std::vector<Diagonal> diagonals() const override;
-    std::optional<long> lattice_euler() const override;  ///< Those of volumeToMesh, this and the next.
+    std::optional<long> lattice_euler() const override;  ///< Those of volumeToMesh, this and the next two.
+    std::optional<std::size_t> lattice_component_count() const override;
     std::optional<std::vector<Box>> lattice_components() const override;
     TriangleMesh lattice_mesh(const std::vector<Vec3>& places, double reach) const override;
 

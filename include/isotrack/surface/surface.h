@@ -132,7 +132,9 @@ public:
     }
     /// Of that mesh, for much less than its price: the Euler number.
     virtual std::optional<long> lattice_euler() const { return std::nullopt; }
-    /// The components, by boxes that hold the vertices of one in a cell each, for a part of the price.
+    /// And how many components it has.
+    virtual std::optional<std::size_t> lattice_component_count() const { return std::nullopt; }
+    /// They themselves, by boxes that hold the vertices of one in a cell each, for a part of the price.
     virtual std::optional<std::vector<Box>> lattice_components() const { return std::nullopt; }
 };
 
