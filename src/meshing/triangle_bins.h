@@ -24,8 +24,8 @@ public:
     std::vector<int> meeting(const Box& box) const;
 
     /// Calls `visit(triangle)` with those in the cube of a place and others near, then with those in more
-    /// cubes, and so on, some more than once: until `is_enough(distance)` holds for a distance within which all were visited,
-    /// or all were.
+    /// cubes, and so on, some more than once: until `is_enough(distance)` holds for a distance within which
+    /// all were visited, or all were.
     template <typename Visit, typename IsEnough>
     void for_each_near(const Vec3& place, const Visit& visit, const IsEnough& is_enough) const {
         constexpr double kFirst = 0.25;  // most find what they look for there

@@ -50,7 +50,7 @@ private:
     std::size_t place_of(const Coord& from, int axis) const {
         const auto part = [](int i, std::uint64_t factor) { return static_cast<std::uint32_t>(i) * factor; };
         const std::uint64_t mixed = part(from.x(), 0x9e3779b97f4a7c15) ^ part(from.y(), 0xc2b2ae3d27d4eb4f) ^
-                                    part(4 * from.z() + axis, 0x165667b19e3779f9);
+                                    part(from.z(), 0x165667b19e3779f9) ^ part(axis, 0x27d4eb2f165667c5);
         return static_cast<std::size_t>(mixed >> 20) & (places_.size() - 1);
     }
 

@@ -1,5 +1,6 @@
 #include "isotrack/surface/level_set.h"
 
+#include <openvdb/tools/Count.h>
 #include <openvdb/tools/ValueTransformer.h>
 #include <openvdb/tools/VolumeToMesh.h>
 #include <tbb/parallel_for.h>
@@ -29,6 +30,7 @@ using openvdb::FloatGrid;
 using openvdb::FloatTree;
 
 constexpr double kFewNodes = 0.25;  // of the active ones
+constexpr double kLeastBand = 0.1;  // voxels
 constexpr double kMostCut = 0.6;    // of the crossings, by the end of the band: shreds otherwise
 
 /// Length of the world gradient at the surface, away from the border; 0 when there is nothing to measure.
@@ -138,8 +140,11 @@ struct LevelSet::Impl {
             to_world_distances(*own, scale, map.voxel_size);
             found = find_crossed_edges(own->constTree());
         }
-        band = std::clamp(std::min<double>(grid->background(), depth_inside(grid->constTree())),
-                          map.voxel_size, kFarVoxels * map.voxel_size);
+        // The inside of a fog volume is active, and all of one density.
+        const double inside =
+            fog ? -openvdb::tools::minMax(grid->tree()).min() : depth_inside(grid->constTree());
+        band = map.voxel_size * std::clamp(std::min<double>(grid->background(), inside) / map.voxel_size,
+                                           kLeastBand, kFarVoxels);
         crossed = std::move(found);
         bounds = tbb::parallel_reduce(
             tbb::blocked_range<std::size_t>(0, crossed.edges.size(), 4096), Box(),

@@ -129,7 +129,7 @@ TEST(IsoValue, IsTakenInBlocksThatSayNothingOfTheOutside) {
 
 TEST(IsoValue, LeavesLessOfTheBandOnOneSide) {
     // A tolerance must not be larger than what is known on either.
-    for (const double voxels : {-1.25, 1.25}) {
+    for (const double voxels : {-2.25, -1.25, 1.25, 2.25}) {
         const LevelSet level_set(unit_sphere(3.0f), {voxels * kVoxel});
         EXPECT_GT(level_set.reach(), kVoxel);
         const auto probe = level_set.probe();
@@ -138,6 +138,15 @@ TEST(IsoValue, LeavesLessOfTheBandOnOneSide) {
                 EXPECT_GE(std::abs(probe->farther_value(r * direction)),
                           std::min(level_set.reach(), std::abs(r - 1.0 - voxels * kVoxel)) - 0.15 * kVoxel);
     }
+}
+
+TEST(IsoValue, OfAFogVolumeIsNearerToOneOfItsEnds) {
+    // Three voxels of slope, of which 0.3 are inside.
+    const auto grid = unit_sphere(3.0f);
+    openvdb::tools::sdfToFogVolume(*grid);
+    const LevelSet level_set(grid, {0.9});
+    EXPECT_LT(level_set.reach(), 0.7 * kVoxel);
+    EXPECT_GE(std::abs(level_set.probe()->farther_value(Vec3::Zero())), level_set.reach() - 1e-6);
 }
 
 TEST(IsoValue, MayHaveNoSurfaceInTheBand) {

@@ -113,7 +113,9 @@ TEST(LatticeMesh, HasTheEulerNumberThatItsCellsSay) {
             values.setValue(node, random() % 3 > 0 ? -size : size);
         }
         const LevelSet scattered(grid);
-        EXPECT_EQ(scattered.lattice_euler(), mesh_topology(volume_to_mesh(scattered)).euler) << seed;
+        const MeshTopology theirs = mesh_topology(volume_to_mesh(scattered));
+        EXPECT_EQ(scattered.lattice_euler(), theirs.euler) << seed;
+        EXPECT_EQ(scattered.lattice_component_count(), theirs.components) << seed;
     }
 }
 
