@@ -132,7 +132,7 @@ TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfa
 
 namespace {
 
-/// `error_of(a, b, c, probe)` of each triangle.
+/// `error_of(a, b, c, probe)` of each triangle abc.
 template <typename ErrorOf>
 std::vector<TriangleError> errors_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                                      const Surface& surface, const ErrorOf& error_of) {
@@ -153,18 +153,14 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps, double refine_above) {
     return errors_of(points, triangles, surface,
-                     [&](const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
-                         return triangle_error(a, b, c, probe, steps, refine_above);
-                     });
+                     [&](auto&... at) { return triangle_error(at..., steps, refine_above); });
 }
 
 std::vector<TriangleError> certified_errors(const std::vector<Vec3>& points,
                                             const std::vector<Triangle>& triangles, const Surface& surface,
                                             double detail, double refine_above) {
     return errors_of(points, triangles, surface,
-                     [&](const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
-                         return certified_error(a, b, c, probe, detail, refine_above);
-                     });
+                     [&](auto&... at) { return certified_error(at..., detail, refine_above); });
 }
 
 std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell,
