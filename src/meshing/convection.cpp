@@ -61,18 +61,22 @@ void update_labels(CellLabels& labels, const std::vector<int>& changed, const Te
             const Vec3 e1 = points[v[1]] - p0, e2 = points[v[2]] - p0, e3 = points[v[3]] - p0;
             const Vec3 centroid = p0 + 0.25 * (e1 + e2 + e3);
             double value = probe.value(centroid);
-            double depth = std::abs(value);
-            const bool deep = one_sheet && depth >= resolution && depth < far;
-            if (deep) depth = std::abs(probe.farther_value(centroid));
+            const double depth = std::abs(value);
             if (one_sheet && depth < far) {
                 Vec3 centre;
                 const bool flat = !circumcentre(e1, e2, e3, centre);
                 const double at_centre = flat ? 0.0 : probe.value(p0 + centre);
-                // The gradient is dear, and matters only where the two do not agree. Beyond the band of a
-                // grid there is none.
-                const bool beyond_band = deep && depth > std::abs(value);
-                if ((flat || (at_centre < 0.0) != (value < 0.0)) &&
-                    (beyond_band || probe.sample(centroid).gradient.norm() > kClear)) {
+                // How deep it is and whether sheets are near is dear, and matters only where the two do not
+                // agree. Beyond the band of a grid there is no gradient.
+                const auto is_in_doubt = [&] {
+                    if (depth >= resolution) {
+                        const double farther = std::abs(probe.farther_value(centroid));
+                        if (farther >= far) return false;
+                        if (farther > depth) return true;
+                    }
+                    return probe.sample(centroid).gradient.norm() > kClear;
+                };
+                if ((flat || (at_centre < 0.0) != (value < 0.0)) && is_in_doubt()) {
                     if (flat) {
                         labels[c] = kFlat;
                         continue;
