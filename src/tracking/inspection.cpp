@@ -16,9 +16,10 @@
 namespace isotrack {
 namespace {
 
-constexpr double kLostAt = 3.0;      // tolerances
-constexpr double kMany = 0.3;        // of the triangles: when more change all distances are measured again
-constexpr double kFaultReach = 1.5;  // resolutions
+constexpr double kLostAt = 3.0;  // tolerances
+constexpr double kMany = 0.3;    // of the triangles: when more change all distances are measured again
+constexpr double kAroundChanges = 2.01;                    // cutoffs: and some room for rounding
+constexpr double kFaultReach = 1.5;                        // resolutions
 constexpr double kMissedSpacing = 0.75, kMissedAt = 1.3;   // resolutions, tolerances: no particle is nearer
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
 constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
@@ -185,6 +186,9 @@ Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     Inspection result;
     doubt(measure_errors(mesh, result), kVainSpacing, result);
     measured_ = true;
+    if (!changes_.many)
+        changes_.around =
+            triangles_around(changes_.went, kAroundChanges * cutoff(), mesh.vertices, mesh.carved.triangles);
     for (std::size_t d = 0; d < distances_.size(); ++d) {
         distances_[d].measure(mesh.vertices, mesh.carved.triangles, changes_);
         take_missed(d, result);

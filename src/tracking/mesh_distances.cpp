@@ -10,6 +10,27 @@
 
 namespace isotrack {
 
+std::vector<Triangle> triangles_around(const std::vector<Facet>& went, double reach,
+                                       const std::vector<Vec3>& vertices,
+                                       const std::vector<Triangle>& triangles) {
+    Box box;
+    for (const Facet& facet : went)
+        for (const Eigen::Vector3f& corner : facet.corner) box.extend(corner.cast<double>());
+    if (box.isEmpty()) return {};
+    const Box around(box.min() - Vec3::Constant(reach), box.max() + Vec3::Constant(reach));
+    constexpr std::size_t kTrianglesPerBlock = 8192;
+    return find_in_blocks<Triangle>(
+        triangles.size(), kTrianglesPerBlock,
+        [&](std::size_t begin, std::size_t end, std::vector<Triangle>& found) {
+            for (std::size_t t = begin; t < end; ++t) {
+                const auto& [i, j, k] = triangles[t];
+                const Vec3 low = vertices[i].cwiseMin(vertices[j]).cwiseMin(vertices[k]),
+                           high = vertices[i].cwiseMax(vertices[j]).cwiseMax(vertices[k]);
+                if (around.intersects(Box(low, high))) found.push_back(triangles[t]);
+            }
+        });
+}
+
 void MeshDistances::measure(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                             const FacetChanges& changes) {
     if (distances_.empty() || changes.many) {
@@ -54,7 +75,7 @@ void MeshDistances::measure(const std::vector<Vec3>& vertices, const std::vector
     }
     for (const Near& n : near(changes.came, [&](double d) { return std::min(d, cutoff_); }))
         distances_[n.point] = std::min(distances_[n.point], n.distance);
-    crossing_distances(vertices, triangles, points_, unknown, cutoff_, distances_);
+    crossing_distances(vertices, changes.around, points_, unknown, cutoff_, distances_);
 }
 
 MeshDistances::Survey MeshDistances::survey(double limit) const {

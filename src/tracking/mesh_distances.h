@@ -14,8 +14,15 @@ namespace isotrack {
 /// From the mesh before to this.
 struct FacetChanges {
     std::vector<Facet> came, went;
-    bool many = false;  ///< So many that all distances had better be measured again.
+    bool many = false;             ///< So many that all distances had better be measured again.
+    std::vector<Triangle> around;  ///< If not: those of this mesh that may be nearest now to what was nearest
+                                   ///< to one that went.
 };
+
+/// The triangles in a box around `went` that reaches so far beyond it.
+std::vector<Triangle> triangles_around(const std::vector<Facet>& went, double reach,
+                                       const std::vector<Vec3>& vertices,
+                                       const std::vector<Triangle>& triangles);
 
 class MeshDistances {
 public:
@@ -23,7 +30,8 @@ public:
     MeshDistances(const CrossingGrid& points, double cutoff) : points_(points), cutoff_(cutoff) {}
 
     void forget() { distances_.clear(); }
-    /// `changes`: since the mesh measured last, if there is one.
+    /// `changes`: since the mesh measured last, if there is one, with the triangles within two cutoffs
+    /// around.
     void measure(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                  const FacetChanges& changes);
 
