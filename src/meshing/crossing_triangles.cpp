@@ -1,33 +1,27 @@
 #include "meshing/crossing_triangles.h"
 
-#include <algorithm>
-
 #include "isotrack/meshing/self_intersections.h"
-#include "meshing/triangle_box.h"
+#include "meshing/triangle_bins.h"
 
 namespace isotrack {
 
 std::vector<char> crossing_triangles(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                                      const std::vector<char>& fresh) {
     // Only what is in the box of a fresh triangle can cross it.
-    std::vector<Box> places;
-    double widest = 0.0;
+    std::vector<Triangle> some;
+    Box around;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         if (!fresh[t]) continue;
-        places.push_back(box_of(points, triangles[t]));
-        widest = std::max(widest, places.back().sizes().x());
+        some.push_back(triangles[t]);
+        around.extend(box_of(points, triangles[t]));
     }
-    std::sort(places.begin(), places.end(),
-              [](const Box& a, const Box& b) { return a.min().x() < b.min().x(); });
+    const TriangleBins bins(points, some, 0.0);
     TriangleMesh near;
     near.points = points;
     std::vector<std::size_t> of;  // triangle of each that is near
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         const Box box = box_of(points, triangles[t]);
-        auto place = std::lower_bound(places.begin(), places.end(), box.min().x() - widest,
-                                      [](const Box& p, double x) { return p.min().x() < x; });
-        while (place != places.end() && place->min().x() <= box.max().x() && !place->intersects(box)) ++place;
-        if (place == places.end() || place->min().x() > box.max().x()) continue;
+        if (!around.intersects(box) || !bins.any_meets(box)) continue;
         near.triangles.push_back(triangles[t]);
         of.push_back(t);
     }

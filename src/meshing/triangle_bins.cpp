@@ -45,6 +45,12 @@ std::vector<int> TriangleBins::meeting(const Box& box) const {
     return result;
 }
 
+bool TriangleBins::any_meets(const Box& box) const {
+    bool result = false;
+    for_each_in(range_of(box), [&](int t) { result = result || box_of(t).intersects(box); });
+    return result;
+}
+
 TriangleBins::Range TriangleBins::range_of(const Box& box) const {
     const auto cube_at = [&](const Vec3& p) -> Eigen::Array3i {
         const Eigen::Array3d at = ((p - low_) / size_).array().floor();

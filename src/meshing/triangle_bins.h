@@ -22,6 +22,8 @@ public:
 
     /// Those whose boxes meet this one, ascending.
     std::vector<int> meeting(const Box& box) const;
+    /// Whether there are any.
+    bool any_meets(const Box& box) const;
 
     /// Calls `visit(triangle)` with those in the cube of a place and others near, then with those in more
     /// cubes, and so on, some more than once: until `is_enough(distance)` holds for a distance within which
