@@ -101,8 +101,18 @@ void Inspector::restart() {
 
 void Inspector::expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles) {
     expected_.emplace(Expected{{particles.size(), triangles}, {}});
-    expected_->errors = certified_errors(particles, expected_->triangles.triangles(), surface_,
-                                         limits_.detail, kSuspect * limits_.tolerance);
+    expected_->errors = errors_of(particles, expected_->triangles.triangles());
+}
+
+std::vector<TriangleError> Inspector::errors_of(const std::vector<Vec3>& vertices,
+                                                const std::vector<Triangle>& triangles) const {
+    return certified_errors(vertices, triangles, surface_, limits_.detail, kSuspect * limits_.tolerance);
+}
+
+std::vector<TriangleError> Inspector::errors_of(const std::vector<Vec3>& corners) const {
+    std::vector<Triangle> triangles;
+    for (int c = 0; c < static_cast<int>(corners.size()); c += 3) triangles.push_back({c, c + 1, c + 2});
+    return errors_of(corners, triangles);
 }
 
 std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
@@ -130,8 +140,7 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     std::vector<Triangle> fresh;
     for (std::size_t f = 0; f < facets.size(); ++f)
         if (!known[f]) fresh.push_back(from_least_corner(mesh.carved.triangles[f]));
-    const auto errors =
-        certified_errors(mesh.vertices, fresh, surface_, limits_.detail, kSuspect * limits_.tolerance);
+    const auto errors = errors_of(mesh.vertices, fresh);
     auto next = errors.begin();
     for (const TriangleError*& error : known)
         if (!error) error = &*next++;

@@ -65,6 +65,8 @@ public:
     /// there when it was inspected is no matter.
     std::vector<Surface::Crossing> newly_missed(const Inspection& now, const std::vector<Vec3>& vertices,
                                                 const std::vector<Triangle>& triangles) const;
+    /// As `inspect` finds them, of triangles of three corners each; the first is the one of the least number.
+    std::vector<TriangleError> errors_of(const std::vector<Vec3>& corners) const;
     /// The points between crossings found so far.
     const std::deque<CrossingGrid>& between() const { return between_; }
     /// Whether some crossings stand for all: the tolerance is several resolutions.
@@ -75,6 +77,8 @@ public:
     void inspect_topology(const FrameMesh& mesh, Inspection& inspection);
 
 private:
+    std::vector<TriangleError> errors_of(const std::vector<Vec3>& vertices,
+                                         const std::vector<Triangle>& triangles) const;
     /// Measures the triangles that are not those of the mesh before. Returns what cannot be mended, or was
     /// not when it was seen last.
     std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);

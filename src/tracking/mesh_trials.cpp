@@ -9,9 +9,9 @@
 namespace isotrack {
 namespace {
 
-double largest_error(const Inspection& inspection) {
+double largest_of(const std::vector<TriangleError>& errors) {
     double result = 0.0;
-    for (const TriangleError& error : *inspection.errors) result = std::max(result, error.largest);
+    for (const TriangleError& error : errors) result = std::max(result, error.largest);
     return result;
 }
 
@@ -50,15 +50,22 @@ void MeshTrials::put_back(FrameMesh mesh) {
     inspector_.inspect_topology(mesh_, inspection_);
 }
 
+double MeshTrials::largest_allowed() const {
+    return std::max(kCertified * limits_.tolerance, largest_of(*inspection_.errors));
+}
+
+bool MeshTrials::may_have(const std::vector<Vec3>& corners) const {
+    return largest_of(inspector_.errors_of(corners)) <= largest_allowed();
+}
+
 bool MeshTrials::take(FrameMesh other, std::size_t most_failing) {
     Inspection after = inspector_.inspect_both_ways(other);
     inspector_.look_between(other, after);
-    const bool good =
-        largest_error(after) <= std::max(kCertified * limits_.tolerance, largest_error(inspection_)) &&
-        after.farthest_crossing <= std::max(limits_.tolerance, inspection_.farthest_crossing) &&
-        after.lost_crossings <= inspection_.lost_crossings &&
-        failing_in(after, limits_.tolerance).size() <= most_failing &&
-        inspector_.newly_missed(after, mesh_.vertices, mesh_.carved.triangles).empty();
+    const bool good = largest_of(*after.errors) <= largest_allowed() &&
+                      after.farthest_crossing <= std::max(limits_.tolerance, inspection_.farthest_crossing) &&
+                      after.lost_crossings <= inspection_.lost_crossings &&
+                      failing_in(after, limits_.tolerance).size() <= most_failing &&
+                      inspector_.newly_missed(after, mesh_.vertices, mesh_.carved.triangles).empty();
     if (good) {
         inspector_.inspect_topology(other, after);
         mesh_ = std::move(other);

@@ -120,17 +120,26 @@ bool crosses(const Patch& patch, const FrameMesh& mesh) {
     return any_cross(points, patch.triangles, rest);
 }
 
-/// Whether a triangle of a patch has hardly any area, as where the surface passes through a lattice node.
-bool has_flat_triangle(const Patch& patch, const FrameMesh& mesh) {
-    const auto at = [&](int v) -> const Vec3& {
-        const auto coming = static_cast<std::size_t>(v) - mesh.vertices.size();
-        return static_cast<std::size_t>(v) < mesh.vertices.size() ? mesh.vertices[v] : patch.points[coming];
-    };
-    return std::any_of(patch.triangles.begin(), patch.triangles.end(), [&](const Triangle& t) {
-        const Vec3 a = at(t[1]) - at(t[0]), b = at(t[2]) - at(t[0]);
+/// The corners of the triangles of a patch, three for each.
+std::vector<Vec3> corners_of(const Patch& patch, const FrameMesh& mesh) {
+    std::vector<Vec3> result;
+    for (const Triangle& t : patch.triangles)
+        for (const int v : from_least_corner(t)) {
+            const auto number = static_cast<std::size_t>(v), old = mesh.vertices.size();
+            result.push_back(number < old ? mesh.vertices[number] : patch.points[number - old]);
+        }
+    return result;
+}
+
+/// Whether a triangle has hardly any area, as where the surface passes through a lattice node. Three corners
+/// for each.
+bool has_flat_triangle(const std::vector<Vec3>& corners) {
+    for (std::size_t c = 0; c < corners.size(); c += 3) {
+        const Vec3 a = corners[c + 1] - corners[c], b = corners[c + 2] - corners[c];
         const double longest2 = std::max({a.squaredNorm(), b.squaredNorm(), (b - a).squaredNorm()});
-        return !(a.cross(b).norm() > kFlat * longest2);
-    });
+        if (!(a.cross(b).norm() > kFlat * longest2)) return true;
+    }
+    return false;
 }
 
 /// Those of some places where a patch would change the numbers, or does not fit.
@@ -194,11 +203,17 @@ public:
         const auto patch = patch_for(gone, *bins_, lattice_);
         tried_.insert(std::move(gone));
         if (!patch || !is_wanted(*patch)) return false;
+        const std::vector<Vec3> corners = corners_of(*patch, mesh);
+        if (has_flat_triangle(corners)) return std::nullopt;
+        if (!trials_.may_have(corners)) {
+            ++effort_.refused;
+            return std::nullopt;
+        }
         effort_.triangles += mesh.carved.triangles.size();
         FrameMesh other = patched(mesh, *patch);
         const MeshTopology topology = topology_of(other);
         if (!is_sound(topology) || !are_wanted(topology)) return false;
-        if (has_flat_triangle(*patch, mesh) || crosses(*patch, mesh)) return std::nullopt;
+        if (crosses(*patch, mesh)) return std::nullopt;
         if (!try_mesh(std::move(other))) {
             ++effort_.refused;
             return std::nullopt;
