@@ -21,16 +21,19 @@ namespace isotrack {
 namespace {
 
 // All in resolutions.
-constexpr double kSmall = 3.5;   // reach of the pieces of the mesh that are looked at
-constexpr double kThin = 2.0;    // sheets no farther apart
-constexpr double kApart = 1.5;   // places that near are one
-constexpr double kAround = 2.5;  // the middles of other patches for what fails
+constexpr double kSmall = 3.5;    // reach of the pieces of the mesh that are looked at
+constexpr double kThin = 2.0;     // sheets no farther apart
+constexpr double kApart = 1.5;    // places that near are one
+constexpr double kCovered = 2.0;  // so far apart they leave nothing out
+constexpr double kAround = 2.5;   // the middles of other patches for what fails
 constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
 constexpr double kLatticeReach = 24.0;
 constexpr double kFlat = 1e-3;  // twice the area over the square of the longest edge
 constexpr std::size_t kMostFailing = 64, kMostPlaces = 300;
 constexpr int kMostPatches = 1000, kMostRefused = 50;  // that are made, and whose meshes are inspected
 constexpr std::size_t kMostTriangles = 10000000;       // of the whole meshes they make
+constexpr std::size_t kMostEverywhere = 20000;         // places all over a mesh
+constexpr long kMostAstray = 30;                       // components and handles, to look for them there
 constexpr std::size_t kMostPairs = 100000000;          // of components
 
 /// Those of some places that are not near to one before.
@@ -65,18 +68,6 @@ std::vector<Vec3> suspicious_places(const FrameMesh& mesh, const LatticeTopology
     for (const int p : mesh.carved.particle) at_thin.push_back(p >= 0 && thickness[p] < kThin * resolution);
     for (const int v : small_handles(mesh.vertices, mesh.carved.triangles, at_thin, kSmall * resolution))
         result.push_back(mesh.vertices[v]);
-    return apart(result, kApart * resolution);
-}
-
-/// Where the mesh may have another topology than the lattice although nothing tells: small handles anywhere,
-/// and where lattice nodes are joined across a face.
-std::vector<Vec3> other_places(const FrameMesh& mesh, const Surface& surface) {
-    const double resolution = surface.resolution();
-    std::vector<Vec3> result;
-    for (const int v : small_handles(mesh.vertices, mesh.carved.triangles,
-                                     std::vector<char>(mesh.vertices.size(), 1), kSmall * resolution))
-        result.push_back(mesh.vertices[v]);
-    for (const auto& diagonal : surface.diagonals()) result.push_back(0.5 * (diagonal.from + diagonal.to));
     return apart(result, kApart * resolution);
 }
 
@@ -142,19 +133,22 @@ bool has_flat_triangle(const std::vector<Vec3>& corners) {
     return false;
 }
 
-/// Those of some places where a patch would change the numbers, or does not fit.
+/// Those of some places where a patch would change the numbers, and then those where it does not fit.
 std::vector<Vec3> doubtful(const std::vector<Vec3>& places, const FrameMesh& mesh, const Surface& surface) {
     if (places.empty()) return {};
     const double resolution = surface.resolution();
     PatchSource lattice(surface.lattice_mesh(places, 4.0 * kSmall * resolution), resolution);
     const TriangleBins bins(mesh.vertices, mesh.carved.triangles, resolution);
-    std::vector<char> doubt(places.size());
+    enum Verdict : char { kSame, kUnlike, kUnfit };
+    std::vector<Verdict> verdict(places.size());
     tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
         const auto patch = patch_for(triangles_around(places[p], kSmall * resolution, bins), bins, lattice);
-        doubt[p] = !patch || patch->euler != 0 || patch->components != 0;
+        verdict[p] = !patch ? kUnfit : patch->euler != 0 || patch->components != 0 ? kUnlike : kSame;
     });
-    std::vector<Vec3> result = places;
-    compact(result, doubt);
+    std::vector<Vec3> result;
+    for (const Verdict wanted : {kUnlike, kUnfit})
+        for (std::size_t p = 0; p < places.size(); ++p)
+            if (verdict[p] == wanted) result.push_back(places[p]);
     return result;
 }
 
@@ -289,13 +283,19 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         patch_near(some, -1);
     };
     search(likely);
-    search(places);
+    // Nothing may tell where the fault is.
+    const std::vector<Vec3> all = apart(trials.mesh().vertices, kCovered * resolution);
+    if (now > 0 && now <= kMostAstray && all.size() <= kMostEverywhere && !effort.is_enough()) {
+        std::vector<Vec3> others = doubtful(all, trials.mesh(), surface);
+        if (others.size() > kMostPlaces) others.resize(kMostPlaces);
+        patcher = std::make_unique<Patcher>(trials, others, surface, effort);
+        around.clear();
+        search(others);
+    }
     if (now == 0 || effort.is_enough()) return count;
-    std::vector<Vec3> others = other_places(trials.mesh(), surface);
-    if (others.size() > kMostPlaces) others.resize(kMostPlaces);
-    patcher = std::make_unique<Patcher>(trials, others, surface, effort);
+    patcher = std::make_unique<Patcher>(trials, places, surface, effort);
     around.clear();
-    search(others);
+    search(places);
     return count;
 }
 
