@@ -70,13 +70,14 @@ private:
 };
 
 void summarise(const RunReport& report, const std::string& output, double seconds) {
-    std::size_t written = 0, failed = 0, missed = 0, unsound = 0, least = 0, most = 0;
+    std::size_t written = 0, failed = 0, missed = 0, unsound = 0, unlike = 0, least = 0, most = 0;
     double error = 0.0;
     for (const FrameReport& row : report.frames) {
         failed += row.status == "failed";
         missed += row.status == "tolerance_not_met";
         if (row.status == "failed" || row.status == "skipped") continue;
         unsound += !row.closed || !row.manifold || row.self_intersections > 0;
+        unlike += row.has_other_topology();
         least = written == 0 ? row.triangles : std::min(least, row.triangles);
         most = std::max(most, row.triangles);
         error = std::max(error, row.max_error_vx);
@@ -90,6 +91,8 @@ void summarise(const RunReport& report, const std::string& output, double second
                                   : fmt::format("{} not sound", unsound),
                      seconds);
     if (missed > 0) spdlog::warn("{} frames missed the tolerance", missed);
+    if (unlike > 0)
+        spdlog::warn("{} meshes have another number of components or handles than their level sets", unlike);
     if (failed > 0 && report.frames.size() > 1)
         spdlog::error("{} of {} frames failed", failed, report.frames.size());
 }

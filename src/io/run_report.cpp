@@ -31,6 +31,7 @@ Json to_object(const FrameReport& row) {
             {"triangles", row.triangles},
             {"components", row.components},
             {"euler", row.euler},
+            {"surface_euler", row.surface_euler ? Json(*row.surface_euler) : Json(nullptr)},
             {"born", row.born},
             {"died", row.died},
             {"seeded", row.seeded},

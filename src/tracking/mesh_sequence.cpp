@@ -173,6 +173,7 @@ void describe(const TrackedFrame& tracked, const LevelSet& level_set, FrameRepor
     row.triangles = tracked.mesh.triangles.size();
     row.components = topology.components;
     row.euler = topology.euler;
+    row.surface_euler = level_set.lattice_euler();
     row.closed = topology.closed() && topology.oriented();
     row.manifold = topology.manifold();
     row.opened = tracked.opened;
@@ -204,6 +205,9 @@ void describe(const TrackedFrame& tracked, const LevelSet& level_set, FrameRepor
                            " grid edges cross surface that the mesh lost";
         if (tracked.most_turned_deg >= kTurnedOverDeg) row.message += "; a triangle is turned over";
     }
+    if (row.has_other_topology())
+        row.message += (row.message.empty() ? "" : "; ") + ("Euler number " + std::to_string(row.euler)) +
+                       ", the level set's " + std::to_string(*row.surface_euler);
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ FrameReport some_row() {
     row.grid = "phi";
     row.triangles = 123456789012;
     row.euler = -4;
+    row.surface_euler = 2;
     row.seconds = {{"read", 0.5}, {"total", 1.5}};
     row.closed = false;
     row.status = "failed";
@@ -33,27 +34,45 @@ TEST(RunReport, GivesEveryFieldOfARowInOrder) {
     const ordered_json row = ordered_json::parse(to_json(some_row()));
     std::vector<std::string> names;
     for (const auto& item : row.items()) names.push_back(item.key());
-    EXPECT_EQ(names, (std::vector<std::string>{"frame",          "time",
-                                               "input",          "grid",
-                                               "output",         "voxel_size",
-                                               "active_voxels",  "particles",
-                                               "vertices",       "triangles",
-                                               "components",     "euler",
-                                               "born",           "died",
-                                               "seeded",         "lost",
-                                               "sweeps",         "delaunay_strategy",
-                                               "relocated",      "max_error_vx",
-                                               "rms_error_vx",   "most_turned_deg",
-                                               "min_angle_deg",  "closed",
-                                               "manifold",       "opened",
-                                               "lost_crossings", "self_intersections",
-                                               "seconds",        "peak_memory_mb",
-                                               "status",         "message"}));
+    EXPECT_EQ(names, (std::vector<std::string>{"frame",
+                                               "time",
+                                               "input",
+                                               "grid",
+                                               "output",
+                                               "voxel_size",
+                                               "active_voxels",
+                                               "particles",
+                                               "vertices",
+                                               "triangles",
+                                               "components",
+                                               "euler",
+                                               "surface_euler",
+                                               "born",
+                                               "died",
+                                               "seeded",
+                                               "lost",
+                                               "sweeps",
+                                               "delaunay_strategy",
+                                               "relocated",
+                                               "max_error_vx",
+                                               "rms_error_vx",
+                                               "most_turned_deg",
+                                               "min_angle_deg",
+                                               "closed",
+                                               "manifold",
+                                               "opened",
+                                               "lost_crossings",
+                                               "self_intersections",
+                                               "seconds",
+                                               "peak_memory_mb",
+                                               "status",
+                                               "message"}));
     EXPECT_EQ(row["frame"], 7);
     EXPECT_EQ(row["time"], 0.25);
     EXPECT_EQ(row["input"], "in \"quoted\".vdb");
     EXPECT_EQ(row["triangles"], 123456789012);
     EXPECT_EQ(row["euler"], -4);
+    EXPECT_EQ(row["surface_euler"], 2);
     EXPECT_EQ(row["seconds"]["total"], 1.5);
     EXPECT_EQ(row["closed"], false);
     EXPECT_EQ(row["manifold"], true);
@@ -70,6 +89,19 @@ TEST(RunReport, WritesNullForWhatIsNoNumber) {
     EXPECT_TRUE(json["max_error_vx"].is_null());
     EXPECT_TRUE(json["rms_error_vx"].is_null());
     EXPECT_TRUE(json["seconds"]["total"].is_null());
+    EXPECT_TRUE(json["surface_euler"].is_null());
+}
+
+TEST(RunReport, TellsAnotherTopology) {
+    FrameReport row;
+    row.euler = 2;
+    EXPECT_FALSE(row.has_other_topology()) << "that of the surface is not known";
+    row.surface_euler = 2;
+    EXPECT_FALSE(row.has_other_topology());
+    row.surface_euler = 0;
+    EXPECT_TRUE(row.has_other_topology());
+    row.opened = true;
+    EXPECT_FALSE(row.has_other_topology()) << "the mesh has a border, the surface none";
 }
 
 TEST(RunReport, SurvivesTextThatIsNotUtf8) {

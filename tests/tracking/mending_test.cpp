@@ -289,6 +289,7 @@ TEST(MeshDistances, AfterChangesAreThoseMeasuredAnew) {
             changes.went = around(5);
             std::swap(mesh, changed);
             changes.came = around(5);
+            changes.around = triangles_around(changes.went, 2.01 * cutoff, mesh.points, mesh.triangles);
             distances.measure(mesh.points, mesh.triangles, changes);
             const auto anew = crossing_distances(mesh.points, mesh.triangles, grid, cutoff);
             std::swap(mesh, changed);

@@ -188,10 +188,33 @@ TEST(MeshSequence, FollowsAGeneratedSequenceThatMergesAndSplits) {
     for (const FrameReport& row : report.frames) {
         EXPECT_EQ(row.status, "ok") << row.message;
         EXPECT_EQ(row.euler, 2 * static_cast<long>(row.components));
+        EXPECT_EQ(row.surface_euler, row.euler);
         components.insert(row.components);
         EXPECT_TRUE(fs::exists(row.output)) << row.output;
     }
     EXPECT_EQ(components, (std::set<std::size_t>{1, 2}));
+}
+
+TEST(MeshSequence, SaysWhenAMeshHasAnotherTopology) {
+    // A reconstruction from the points alone fills the void.
+    TempFolder folder;
+    SampleSequence sequence("shell", {});
+    write_grids(folder.file("shell.vdb"), sequence.next().surface, {});
+    MeshSequenceOptions options;
+    for (const Reconstruction reconstruction : {Reconstruction::Guided, Reconstruction::Pure}) {
+        const bool filled = reconstruction == Reconstruction::Pure;
+        options.reconstruction = reconstruction;
+        options.on_existing = OnExisting::Overwrite;
+        const RunReport report =
+            mesh_sequence(find_frames({folder.file("shell.vdb")}), folder.file("m.ply"), options);
+        ASSERT_EQ(report.frames.size(), 1u);
+        const FrameReport& row = report.frames[0];
+        EXPECT_EQ(row.euler, filled ? 2 : 4);
+        EXPECT_EQ(row.surface_euler, 4);
+        EXPECT_EQ(row.has_other_topology(), filled);
+        EXPECT_EQ(row.message.find("Euler number 2, the level set's 4") != std::string::npos, filled)
+            << row.message;
+    }
 }
 
 TEST(MeshSequence, GivesTheSameBytesEachTime) {

@@ -17,6 +17,8 @@ struct FrameReport {
     double voxel_size = 0.0;
     std::size_t active_voxels = 0, particles = 0, vertices = 0, triangles = 0, components = 0;
     long euler = 0;
+    std::optional<long> surface_euler;  ///< Of the level set's lattice, joined as volumeToMesh does; see
+                                        ///< `Surface::lattice_euler`. Where it is another: `message`.
     std::size_t born = 0, died = 0;  ///< Particles of this frame that were not in the last, and the reverse.
     std::size_t seeded = 0,
                 lost = 0;  ///< Of the born, seeded on uncovered surface; of the died, those the carry lost.
@@ -35,6 +37,9 @@ struct FrameReport {
     double peak_memory_mb = 0.0;
     std::string status = "ok";  ///< "ok", "empty", "skipped", "failed", "tolerance_not_met".
     std::string message;
+
+    /// The mesh has components or handles that the level set does not have, or lacks some.
+    bool has_other_topology() const { return surface_euler && !opened && euler != *surface_euler; }
 };
 
 struct RunReport {
