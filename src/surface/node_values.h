@@ -3,7 +3,6 @@
 
 #include <openvdb/openvdb.h>
 
-#include <algorithm>
 #include <cstring>
 #include <memory>
 
@@ -13,14 +12,13 @@ namespace isotrack {
 class NodeValues {
     using Coord = openvdb::Coord;
     using Leaf = openvdb::FloatTree::LeafNodeType;
-    static constexpr int kLeafDim = Leaf::DIM;
+    static constexpr int kLeafDim = Leaf::DIM, kMask = kLeafDim - 1;
 
 public:
-    explicit NodeValues(const openvdb::FloatTree& tree) : tree_(tree) {}
+    explicit NodeValues(const openvdb::FloatTree& tree) : leaves_(tree) {}
 
     float at(const Coord& node) {
-        constexpr int kMask = kLeafDim - 1;
-        return leaf(node)[offset(node.x() & kMask, node.y() & kMask) + (node.z() & kMask)];
+        return place_of(node).values[offset(node.x() & kMask, node.y() & kMask) + (node.z() & kMask)];
     }
 
     /// Those of N^3 nodes from `low` on. With N = 4 the columns at the corners of the first two axes are left
@@ -28,55 +26,53 @@ public:
     template <int N>
     void block(const Coord& low, float (&v)[N][N][N]) {
         static_assert(N <= kLeafDim, "two leaves in a row hold all");
-        const Coord in_leaf = low & (kLeafDim - 1);
-        const float* leaves[2][2][2];
-        for (int a = 0; a <= (in_leaf.x() + N > kLeafDim); ++a)
-            for (int b = 0; b <= (in_leaf.y() + N > kLeafDim); ++b)
-                for (int c = 0; c <= (in_leaf.z() + N > kLeafDim); ++c)
-                    leaves[a][b][c] = leaf(low.offsetBy(kLeafDim * a, kLeafDim * b, kLeafDim * c));
-        const int here = std::min(N, kLeafDim - in_leaf.z());  // of each column, in the first leaf
-        for (int i = 0; i < N; ++i)
-            for (int j = 0; j < N; ++j) {
-                if (N == 4 && (i == 0 || i == 3) && (j == 0 || j == 3)) continue;
-                const int x = in_leaf.x() + i, y = in_leaf.y() + j;
-                const auto& column = leaves[x / kLeafDim][y / kLeafDim];
-                const int at = offset(x % kLeafDim, y % kLeafDim);
-                if (here == N) {
-                    std::memcpy(v[i][j], column[0] + at + in_leaf.z(), sizeof v[i][j]);
-                } else {
-                    for (int k = 0; k < here; ++k) v[i][j][k] = column[0][at + in_leaf.z() + k];
-                    for (int k = here; k < N; ++k) v[i][j][k] = column[1][at + k - here];
+        // What leaf a node is in is computed, not asked: it changes from cell to cell and is seldom foreseen.
+        const int x = low.x() & kMask, y = low.y() & kMask, z = low.z() & kMask;
+        Place& place = place_of(low);
+        const auto for_each_column = [&](const auto& read) {
+            for (int i = 0; i < N; ++i)
+                for (int j = 0; j < N; ++j) {
+                    if (N == 4 && (i == 0 || i == 3) && (j == 0 || j == 3)) continue;
+                    const int a = (x + i) / kLeafDim, b = (y + j) / kLeafDim;
+                    read(v[i][j], place.beyond[a][b], a, b, offset((x + i) & kMask, (y + j) & kMask));
                 }
-            }
+        };
+        const auto values = [&](const float*& known, int a, int b, int c) {
+            return known ? known : meet(known, low.offsetBy(kLeafDim * a, kLeafDim * b, kLeafDim * c));
+        };
+        if (z + N <= kLeafDim) {
+            for_each_column([&](float(&column)[N], const float*(&leaves)[2], int a, int b, int at) {
+                std::memcpy(column, values(leaves[0], a, b, 0) + at + z, sizeof column);
+            });
+        } else {
+            for_each_column([&](float(&column)[N], const float*(&leaves)[2], int a, int b, int at) {
+                const float *here = values(leaves[0], a, b, 0) + at, *next = values(leaves[1], a, b, 1) + at;
+                for (int k = 0; k < N; ++k) column[k] = (z + k < kLeafDim ? here : next)[(z + k) & kMask];
+            });
+        }
     }
 
 private:
     struct Place {
         const float* values = nullptr;
-        Coord leaf;                     // in leaves
-        std::unique_ptr<float[]> tile;  // as many values as a leaf has, all the same
+        Coord leaf;                               // in leaves
+        const float* beyond[2][2][2] = {};        // of the next leaves along the axes, once they were met
+        std::unique_ptr<float[]> tile = nullptr;  // as many values as a leaf has, all the same
     };
 
-    /// The values of the leaf that holds a node, or would.
-    const float* leaf(const Coord& node) {
+    /// The place of the leaf that holds a node, or would.
+    Place& place_of(const Coord& node) {
         const Coord at = node >> static_cast<int>(Leaf::LOG2DIM);
         Place& place = places_[((at.x() & 3) << 4) | ((at.y() & 3) << 2) | (at.z() & 3)];
         if (!place.values || place.leaf != at) fetch(node, at, place);
-        return place.values;
+        return place;
     }
-    void fetch(const Coord& node, const Coord& at, Place& place) {
-        place.leaf = at;
-        if (const Leaf* found = tree_.probeConstLeaf(node)) {
-            place.values = found->buffer().data();
-            return;
-        }
-        if (!place.tile) place.tile = std::make_unique<float[]>(Leaf::SIZE);
-        std::fill_n(place.tile.get(), Leaf::SIZE, tree_.getValue(node));
-        place.values = place.tile.get();
-    }
+    void fetch(const Coord& node, const Coord& at, Place& place);
+    /// The values of the leaf that holds a node, or would; `known` from now on.
+    const float* meet(const float*& known, const Coord& node);
     static int offset(int x, int y) { return (x * kLeafDim + y) * kLeafDim; }
 
-    const openvdb::FloatTree& tree_;
+    openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> leaves_;  // one thread's, not registered
     Place places_[64];
 };
 

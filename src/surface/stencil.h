@@ -27,11 +27,7 @@ public:
         const openvdb::Coord base = split(index, t);
         float v[2][2][2];
         nodes_.block(base, v);
-        const auto mix = [](double a, double b, double s) { return a + s * (b - a); };
-        double planes[2];
-        for (int i = 0; i < 2; ++i)
-            planes[i] = mix(mix(v[i][0][0], v[i][0][1], t.z()), mix(v[i][1][0], v[i][1][1], t.z()), t.y());
-        const double trilinear = mix(planes[0], planes[1], t.x());
+        const double trilinear = Stencil::trilinear(v, t);
         if (kAmbiguousFaces[inside_corners(v)] == 0) return {trilinear, trilinear};
         const double joined = trilinear + joining_correction(v, joined_in(base, v), t);
         return {joined, is_farther(trilinear, joined) ? trilinear : joined};
@@ -43,22 +39,25 @@ public:
         const openvdb::Coord base = split(index, t);
         float v[4][4][4];  // v[i + 1][j + 1][k + 1] at base + (i, j, k)
         nodes_.block(base.offsetBy(-1), v);
-        const double w[3][2] = {{1.0 - t.x(), t.x()}, {1.0 - t.y(), t.y()}, {1.0 - t.z(), t.z()}};
-        Surface::Sample result{0.0, Vec3::Zero()};
-        for (int a = 0; a < 2; ++a)
-            for (int b = 0; b < 2; ++b) {
-                const double xy = w[0][a] * w[1][b], yz = w[1][a] * w[2][b], xz = w[0][a] * w[2][b];
-                const float* line = v[a + 1][b + 1];
-                result.value += xy * (w[2][0] * line[1] + w[2][1] * line[2]);
-                result.gradient.z() += xy * (w[2][0] * (line[2] - line[0]) + w[2][1] * (line[3] - line[1]));
-                result.gradient.x() += yz * (w[0][0] * (v[2][a + 1][b + 1] - v[0][a + 1][b + 1]) +
-                                             w[0][1] * (v[3][a + 1][b + 1] - v[1][a + 1][b + 1]));
-                result.gradient.y() += xz * (w[1][0] * (v[a + 1][2][b + 1] - v[a + 1][0][b + 1]) +
-                                             w[1][1] * (v[a + 1][3][b + 1] - v[a + 1][1][b + 1]));
-            }
-        result.gradient *= 0.5;
+        using Column = Eigen::Array4f;  // along the third axis
+        const auto column = [&](int i, int j) { return Eigen::Map<const Column>(v[i][j]); };
+        const float w[3][2] = {{static_cast<float>(1.0 - t.x()), static_cast<float>(t.x())},
+                               {static_cast<float>(1.0 - t.y()), static_cast<float>(t.y())},
+                               {static_cast<float>(1.0 - t.z()), static_cast<float>(t.z())}};
+        Column across[4], along[4];  // interpolated along the second axis, along the first
+        for (int i = 0; i < 4; ++i) {
+            across[i] = w[1][0] * column(i, 1) + w[1][1] * column(i, 2);
+            along[i] = w[0][0] * column(1, i) + w[0][1] * column(2, i);
+        }
+        const Column x = w[0][0] * (across[2] - across[0]) + w[0][1] * (across[3] - across[1]),
+                     y = w[1][0] * (along[2] - along[0]) + w[1][1] * (along[3] - along[1]),
+                     middle = w[0][0] * across[1] + w[0][1] * across[2];
+        Surface::Sample result{
+            0.0, 0.5 * Vec3(w[2][0] * x[1] + w[2][1] * x[2], w[2][0] * y[1] + w[2][1] * y[2],
+                            w[2][0] * (middle[2] - middle[0]) + w[2][1] * (middle[3] - middle[1]))};
         const float corners[2][2][2] = {{{v[1][1][1], v[1][1][2]}, {v[1][2][1], v[1][2][2]}},
                                         {{v[2][1][1], v[2][1][2]}, {v[2][2][1], v[2][2][2]}}};
+        result.value = trilinear(corners, t);
         if (kAmbiguousFaces[inside_corners(corners)] != 0)
             result.value += joining_correction(corners, joined_in(base, corners), t);
         return result;
@@ -68,6 +67,13 @@ private:
     // Of the trilinear value: with less the joined surface is near, which must do.
     static constexpr double kNoLess = 0.5;
 
+    static double trilinear(const float (&v)[2][2][2], const Vec3& t) {
+        const auto mix = [](double a, double b, double s) { return a + s * (b - a); };
+        double planes[2];
+        for (int i = 0; i < 2; ++i)
+            planes[i] = mix(mix(v[i][0][0], v[i][0][1], t.z()), mix(v[i][1][0], v[i][1][1], t.z()), t.y());
+        return mix(planes[0], planes[1], t.x());
+    }
     static bool is_farther(double trilinear, double joined) {
         return (joined < 0.0) == (trilinear < 0.0) && std::abs(trilinear) > std::abs(joined) &&
                std::abs(joined) > kNoLess * std::abs(trilinear);

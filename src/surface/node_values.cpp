@@ -1,0 +1,28 @@
+#include "surface/node_values.h"
+
+#include <algorithm>
+
+namespace isotrack {
+
+// Apart from what is asked all the time, so that the compiler puts that in line.
+
+void NodeValues::fetch(const Coord& node, const Coord& at, Place& place) {
+    place.leaf = at;
+    if (const Leaf* found = leaves_.probeConstLeaf(node)) {
+        place.values = found->buffer().data();
+    } else {
+        if (!place.tile) place.tile = std::make_unique<float[]>(Leaf::SIZE);
+        std::fill_n(place.tile.get(), Leaf::SIZE, leaves_.getValue(node));
+        place.values = place.tile.get();
+    }
+    std::fill_n(&place.beyond[0][0][0], 8, nullptr);
+    place.beyond[0][0][0] = place.values;
+}
+
+const float* NodeValues::meet(const float*& known, const Coord& node) {
+    const Place& place = place_of(node);
+    if (place.values != place.tile.get()) known = place.values;  // those of tiles do not stay
+    return place.values;
+}
+
+}  // namespace isotrack
