@@ -213,12 +213,6 @@ struct Tracker::Impl {
         return {particles, surface, l.detail, least, l.max_edge, most, next_id};
     }
 
-    /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
-    std::size_t mend(const FrameMesh& mesh, const Inspection& inspection, const Surface& surface,
-                     const SizingLimits& l, Densifier& densifier) {
-        return densifier.add(shortages(mesh, inspection, dt->cells(), particles, surface, l));
-    }
-
     /// The newborn move like the neighbours that were there before; alone among newborn they rest.
     void inherit_velocities(const std::vector<Triangle>& triangles, Id first_new) {
         std::vector<int> count(particles.size(), 0);
@@ -245,6 +239,9 @@ struct Tracker::Impl {
     void sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, bool warm,
                 TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
+    void place_particles(const Motion& motion, FrameWork& work);
+    void name_vertices(const FrameMesh& mesh, TriangleMesh& named);
+    class Making;
     Finish begin(const Surface& surface, const Motion& motion);
 };
 
@@ -340,24 +337,195 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
     frame.relocated = structure.dt().profile().relocated;
 }
 
-Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motion) {
-    const auto work =
-        std::make_shared<FrameWork>(FrameWork{surface, sizing_limits(options, surface), {}, {}, {}, {}, {}});
-    const SizingLimits& l = work->limits;
-    TrackedFrame& frame = work->frame;
-    FrameMesh& mesh = work->mesh;
-    std::optional<Inspector>& inspector = work->inspector;
-    Inspection& inspection = work->inspection;
-    auto& seconds = frame.seconds;
-    frame.tolerance = effective_tolerance(options, surface);
-    frame.delaunay_strategy = name_of(strategy());
-    const std::size_t relocated = dt->profile().relocated;
-    const std::size_t before = particles.size();
-    const bool as_in_paper = options.method == Method::Paper;
-    const double apart = as_in_paper ? kDenseSeeds : kSparseSeeds;
-    const Id first_new = next_id;
+/// A frame on its way from particles in place to a mesh that passes. All references must outlive it.
+class Tracker::Impl::Making {
+public:
+    Making(Impl& tracker, FrameWork& work) : tracker_(tracker), work_(work) {
+        work.inspector.emplace(work.surface, work.limits, *work.crossings);
+    }
+
+    /// Meshes the particles. Once, when many have to be added, their surroundings make room for them.
+    void mesh_particles();
+    /// Adds particles, and changes labels, until the mesh passes or nothing more can be done. The topology,
+    /// which takes longer to look at, is looked at when all else passes, and so is once more what lies
+    /// between crossings.
+    void certify();
+    /// Exchanges parts of the mesh for those of the lattice.
+    void patch();
+
+private:
+    const TrackerOptions& options() const { return tracker_.options; }
+    Particles& particles() { return tracker_.particles; }
+    const Tetrahedra& cells() const { return tracker_.dt->cells(); }
+    bool in_paper() const { return options().method == Method::Paper; }
+    bool guided() const { return !in_paper() && options().reconstruction == Reconstruction::Guided; }
+
+    void make_mesh();
+    /// Where nothing is thin the nodes of the lattice need not be looked at: the Euler number tells.
+    bool is_thick() const;
+    bool has_topology() const {
+        return guided() && is_thick() && work_.surface.lattice_euler() == euler_of(work_.mesh);
+    }
+    /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
+    std::size_t mend() {
+        return densifier_->add(
+            shortages(work_.mesh, work_.inspection, cells(), particles(), work_.surface, work_.limits));
+    }
+    /// Whether nothing is added and no label changes.
+    bool passes();
+    void insert_added();
+    void mend_components();  // which may find more that is missed
+
+    Impl& tracker_;
+    FrameWork& work_;
+    Fitted fitted_;
+    std::optional<Densifier> densifier_;  // none in the paper's method, which mends nothing
+    std::size_t added_ = 0;
+    int relabellings_ = 0;
+};
+
+void Tracker::Impl::Making::make_mesh() {
+    auto& seconds = work_.frame.seconds;
+    work_.mesh = tracker_.carve_mesh(work_.surface, seconds);
+    if (!options().fit) return;
+    const StageTimer timer(seconds, "fit");
+    fitted_.fit_vertices(work_.mesh, particles().size(), work_.surface);
+}
+
+bool Tracker::Impl::Making::is_thick() const {
+    const double least = std::max(kThick * work_.limits.tolerance, kThickNodes * work_.surface.resolution());
+    const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
+    return std::all_of(thickness.begin(), thickness.end(), [&](double thick) { return thick > least; });
+}
+
+void Tracker::Impl::Making::mesh_particles() {
+    Inspector& inspector = *work_.inspector;
+    LastMesh& last_mesh = tracker_.last_mesh;
+    for (int mending = 0;; ++mending) {
+        inspector.restart();
+        tracker_.tetrahedralise(true, work_.frame.seconds, [&] {
+            if (!options().fit && !in_paper()) inspector.expect(particles().position, last_mesh.triangles);
+            if (!is_thick()) inspector.prepare_topology();
+        });
+        fitted_ = {};
+        make_mesh();
+        const StageTimer timer(work_.frame.seconds, "certify");
+        if (in_paper()) break;
+        work_.inspection =
+            mending == 0 ? inspector.inspect(work_.mesh) : inspector.inspect_both_ways(work_.mesh);
+        last_mesh.evidence.error =
+            errors_at_particles(work_.mesh, *work_.inspection.errors, particles().size());
+        densifier_.emplace(tracker_.make_densifier(work_.surface, work_.limits, work_.crossings->size()));
+        added_ = mend();
+        if (mending == kMostMendings ||
+            static_cast<double>(added_) < kFew * static_cast<double>(particles().size()))
+            break;
+        tracker_.make_room(work_.surface, work_.frame);
+    }
+    // The last mesh is of no more use, and the most memory is needed now.
+    last_mesh.take({}, particles().size());
+}
+
+void Tracker::Impl::Making::insert_added() {
+    // A fitted mesh fails elsewhere than its particles do; of a DT built anew all cells are new.
+    const bool refines = !options().fit && guided() && options().delaunay != UpdateStrategy::Rebuild;
+    auto& seconds = work_.frame.seconds;
+    tracker_.tetrahedralise(false, seconds);
+    if (refines) {
+        const StageTimer timer(seconds, "certify");
+        refine(*tracker_.dt, tracker_.labels, particles(), *densifier_, work_.surface, work_.limits);
+        tracker_.in_dt = particles().id;
+    }
+    make_mesh();
+}
+
+bool Tracker::Impl::Making::passes() {
+    if (mend() > 0) return false;
+    if (options().reconstruction != Reconstruction::Guided || relabellings_ == kMostRelabellings) return true;
+    ++relabellings_;
+    CellLabels& labels = tracker_.labels;
+    return reach_out(labels, cells(), work_.mesh, work_.inspection, particles(), work_.surface,
+                     work_.limits) == 0 &&
+           relabel(labels, cells(), work_.mesh, work_.inspection, particles(), work_.surface, work_.limits) ==
+               0;
+}
+
+void Tracker::Impl::Making::mend_components() {
+    FrameMesh& mesh = work_.mesh;
+    Inspection& inspection = work_.inspection;
+    if (guided()) {
+        const Carve carve_labels = [&](CellLabels& of_cells) {
+            FrameMesh other = tracker_.mesh_of(of_cells, work_.surface);
+            if (!options().fit) return other;
+            Fitted its_own = fitted_;
+            its_own.fit_vertices(other, particles().size(), work_.surface);
+            its_own.undo_crossing(other, particles().size());
+            return other;
+        };
+        MeshTrials trials(mesh, inspection, *work_.inspector, work_.limits);
+        if (join_specks(trials, tracker_.labels, carve_labels, cells(), particles(), work_.surface,
+                        work_.limits) > 0)
+            tracker_.last_mesh.take(mesh.carved, particles(), cells());
+    }
+    const std::vector<std::vector<Vec3>> lost = inspection.topology.lost;
+    remove_specks(mesh, inspection, *work_.inspector, work_.limits);
+    if (guided() && !options().min_edge)
+        put_in_drops(lost, mesh, inspection, *work_.inspector, work_.surface);
+}
+
+void Tracker::Impl::Making::certify() {
+    FrameMesh& mesh = work_.mesh;
+    Inspection& inspection = work_.inspection;
+    Inspector& inspector = *work_.inspector;
+    int trials = 0;
+    for (int round = 0;; ++round) {
+        if (round > 0 || added_ > 0) insert_added();
+        const StageTimer timer(work_.frame.seconds, "certify");
+        const bool last = in_paper() || round == kCertifyRounds;
+        const auto passes_or_last = [&] { return last || passes(); };
+        inspection = inspector.inspect_both_ways(mesh);
+        bool between = round == 0;
+        if (between) inspector.look_between(mesh, inspection);
+        bool good = passes_or_last();
+        if (good && options().fit && fitted_.undo_crossing(mesh, particles().size())) {
+            inspection = inspector.inspect_both_ways(mesh);
+            between = false;
+            good = passes_or_last();
+        }
+        if (!good) continue;
+        if (!between) inspector.look_between(mesh, inspection);
+        tracker_.last_mesh.take(mesh.carved, particles(), cells());
+        const bool known = has_topology();
+        if (!known) inspector.inspect_topology(mesh, inspection);
+        if (!passes_or_last()) continue;
+        if (known) return;
+        mend_components();
+        if (last || ++trials == kMostTrials || inspection.missed.empty() || mend() == 0) return;
+    }
+}
+
+void Tracker::Impl::Making::patch() {
+    if (!guided() || options().min_edge) return;
+    const StageTimer timer(work_.frame.seconds, "certify");
+    const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
+    MeshTrials of_mesh(work_.mesh, work_.inspection, *work_.inspector, work_.limits);
+    if (!has_topology()) {
+        if (work_.inspection.topology.speck.size() != work_.mesh.carved.triangles.size())
+            work_.inspector->inspect_topology(work_.mesh, work_.inspection);
+        patch_topology(of_mesh, thickness, work_.surface);
+    }
+    work_.inspector->look_off_surface(work_.mesh, work_.inspection);
+    patch_failing(of_mesh, thickness, work_.surface);
+}
+
+/// Brings the particles to the surface, and their number and spacing to what it wants.
+void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
+    const Surface& surface = work.surface;
+    const SizingLimits& l = work.limits;
+    TrackedFrame& frame = work.frame;
+    const double apart = options.method == Method::Paper ? kDenseSeeds : kSparseSeeds;
     {
-        const StageTimer timer(seconds, "carry");
+        const StageTimer timer(frame.seconds, "carry");
         if (astray()) arrange();
         const std::vector<char> found = carry(particles, surface, motion);
         particles.retain(found);
@@ -366,151 +534,48 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     }
     const bool warm = !particles.empty();  // where all are lost as well, the surface is met anew
     {
-        const StageTimer timer(seconds, "cover");
-        work->crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
-        if (warm) frame.seeded = cover(particles, surface, *work->crossings, l, options.seed, next_id, apart);
+        const StageTimer timer(frame.seconds, "cover");
+        work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
+        if (warm) frame.seeded = cover(particles, surface, *work.crossings, l, options.seed, next_id, apart);
     }
-    if (!warm) seed(surface, *work->crossings, l, apart, frame);
-    if (as_in_paper)
+    if (!warm) seed(surface, *work.crossings, l, apart, frame);
+    if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
     else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))
         follow(surface, l, kFollowing, warm, frame);
     else
-        sample(surface, *work->crossings, l, warm, frame);
-    Fitted fitted;
-    const auto make_mesh = [&] {
-        mesh = carve_mesh(surface, seconds);
-        if (!options.fit) return;
-        const StageTimer timer(seconds, "fit");
-        fitted.fit_vertices(mesh, particles.size(), surface);
-    };
-    // Where nothing is thin the nodes of the lattice need not be looked at: the Euler number tells.
-    const auto is_thick = [&] {
-        const double least = std::max(kThick * l.tolerance, kThickNodes * surface.resolution());
-        const std::vector<double>& thickness = last_mesh.evidence.thickness;
-        return std::all_of(thickness.begin(), thickness.end(), [&](double thick) { return thick > least; });
-    };
-    const std::size_t crossing_count = work->crossings->size();
-    // Once, when many particles have to be added, their surroundings make room for them.
-    std::size_t added = 0;
-    std::optional<Densifier> densifier;  // none in the paper's method, which mends nothing
-    inspector.emplace(surface, l, *work->crossings);
-    for (int mending = 0;; ++mending) {
-        inspector->restart();
-        tetrahedralise(true, seconds, [&] {
-            if (!options.fit && options.method != Method::Paper)
-                inspector->expect(particles.position, last_mesh.triangles);
-            if (!is_thick()) inspector->prepare_topology();
-        });
-        fitted = {};
-        make_mesh();
-        const StageTimer timer(seconds, "certify");
-        if (options.method == Method::Paper) break;
-        inspection = mending == 0 ? inspector->inspect(mesh) : inspector->inspect_both_ways(mesh);
-        last_mesh.evidence.error = errors_at_particles(mesh, *inspection.errors, particles.size());
-        densifier.emplace(make_densifier(surface, l, crossing_count));
-        added = mend(mesh, inspection, surface, l, *densifier);
-        if (mending == kMostMendings ||
-            static_cast<double>(added) < kFew * static_cast<double>(particles.size()))
-            break;
-        make_room(surface, frame);
-    }
-    // The last mesh is of no more use, and the most memory is needed now.
-    last_mesh.take({}, particles.size());
-    // A fitted mesh fails elsewhere than its particles do; of a DT built anew all cells are new.
-    const bool refines = !options.fit && options.method == Method::Tolerance &&
-                         options.reconstruction == Reconstruction::Guided &&
-                         options.delaunay != UpdateStrategy::Rebuild;
-    const bool guided =
-        options.method == Method::Tolerance && options.reconstruction == Reconstruction::Guided;
-    const auto mend_components = [&] {
-        if (guided) {
-            const Carve carve_labels = [&](CellLabels& of_cells) {
-                FrameMesh other = mesh_of(of_cells, surface);
-                if (!options.fit) return other;
-                Fitted its_own = fitted;
-                its_own.fit_vertices(other, particles.size(), surface);
-                its_own.undo_crossing(other, particles.size());
-                return other;
-            };
-            MeshTrials trials(mesh, inspection, *inspector, l);
-            if (join_specks(trials, labels, carve_labels, dt->cells(), particles, surface, l) > 0)
-                last_mesh.take(mesh.carved, particles, dt->cells());
-        }
-        const std::vector<std::vector<Vec3>> lost = inspection.topology.lost;
-        remove_specks(mesh, inspection, *inspector, l);
-        if (guided && !options.min_edge) put_in_drops(lost, mesh, inspection, *inspector, surface);
-    };
-    const auto has_topology = [&] {
-        return guided && is_thick() && surface.lattice_euler() == euler_of(mesh);
-    };
-    // The topology, which takes longer to look at, is looked at when all else passes, and so is once more
-    // what lies between crossings.
-    int relabellings = 0, trials = 0;
-    for (int round = 0;; ++round) {
-        if (round > 0 || added > 0) {
-            tetrahedralise(false, seconds);
-            if (refines) {
-                const StageTimer timer(seconds, "certify");
-                refine(*dt, labels, particles, *densifier, surface, l);
-                in_dt = particles.id;
-            }
-            make_mesh();
-        }
-        const StageTimer timer(seconds, "certify");
-        const bool last = options.method == Method::Paper || round == kCertifyRounds;
-        const auto passes = [&] {
-            if (last) return true;
-            if (mend(mesh, inspection, surface, l, *densifier) > 0) return false;
-            if (options.reconstruction != Reconstruction::Guided || relabellings == kMostRelabellings)
-                return true;
-            ++relabellings;
-            if (reach_out(labels, dt->cells(), mesh, inspection, particles, surface, l) > 0) return false;
-            return relabel(labels, dt->cells(), mesh, inspection, particles, surface, l) == 0;
-        };
-        inspection = inspector->inspect_both_ways(mesh);
-        bool between = round == 0;
-        if (between) inspector->look_between(mesh, inspection);
-        bool good = passes();
-        if (good && options.fit && fitted.undo_crossing(mesh, particles.size())) {
-            inspection = inspector->inspect_both_ways(mesh);
-            between = false;
-            good = passes();
-        }
-        if (good) {
-            if (!between) inspector->look_between(mesh, inspection);
-            last_mesh.take(mesh.carved, particles, dt->cells());
-            const bool known = has_topology();
-            if (!known) inspector->inspect_topology(mesh, inspection);
-            if (!passes()) continue;
-            if (known) break;
-            mend_components();  // which may find more that is missed
-            if (last || ++trials == kMostTrials || inspection.missed.empty() ||
-                mend(mesh, inspection, surface, l, *densifier) == 0)
-                break;
-        }
-    }
-    if (guided && !options.min_edge) {
-        const StageTimer timer(seconds, "certify");
-        MeshTrials of_mesh(mesh, inspection, *inspector, l);
-        if (!has_topology()) {
-            if (inspection.topology.speck.size() != mesh.carved.triangles.size())
-                inspector->inspect_topology(mesh, inspection);
-            patch_topology(of_mesh, last_mesh.evidence.thickness, surface);
-        }
-        inspector->look_off_surface(mesh, inspection);
-        patch_failing(of_mesh, last_mesh.evidence.thickness, surface);
-    }
-    frame.relocated += dt->profile().relocated - relocated;
-    inherit_velocities(particle_triangles(mesh.carved), first_new);
+        sample(surface, *work.crossings, l, warm, frame);
+}
 
+/// Gives the mesh the ids and velocities of its particles.
+void Tracker::Impl::name_vertices(const FrameMesh& mesh, TriangleMesh& named) {
     std::vector<char> seen(particles.size(), 0);
     for (const int p : mesh.carved.particle) {
         const bool own = p >= 0 && !seen[p];
         if (own) seen[p] = 1;
-        frame.mesh.ids.push_back(own ? particles.id[p] : next_id++);
-        frame.mesh.velocities.push_back(p >= 0 ? particles.velocity[p] : Vec3::Zero());
+        named.ids.push_back(own ? particles.id[p] : next_id++);
+        named.velocities.push_back(p >= 0 ? particles.velocity[p] : Vec3::Zero());
     }
+}
+
+Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motion) {
+    const auto work =
+        std::make_shared<FrameWork>(FrameWork{surface, sizing_limits(options, surface), {}, {}, {}, {}, {}});
+    TrackedFrame& frame = work->frame;
+    frame.tolerance = effective_tolerance(options, surface);
+    frame.delaunay_strategy = name_of(strategy());
+    const std::size_t relocated = dt->profile().relocated, before = particles.size();
+    const Id first_new = next_id;
+
+    place_particles(motion, *work);
+    Making making(*this, *work);
+    making.mesh_particles();
+    making.certify();
+    making.patch();
+
+    frame.relocated += dt->profile().relocated - relocated;
+    inherit_velocities(particle_triangles(work->mesh.carved), first_new);
+    name_vertices(work->mesh, frame.mesh);
     frame.particles = particles.size();
     for (const Id id : particles.id) frame.born += id >= first_new;
     frame.died = before + frame.born - particles.size();
