@@ -33,7 +33,8 @@ public:
 
     void show(const FrameReport& row) {
         ++done_;
-        const bool bad = row.status == "failed" || row.status == "tolerance_not_met";
+        const bool bad =
+            row.status == "failed" || row.status == "tolerance_not_met" || row.has_other_topology();
         if (terminal_ && bad) fmt::print(stderr, "\r\033[K");
         if (row.status == "failed")
             spdlog::error("{}",
@@ -91,8 +92,7 @@ void summarise(const RunReport& report, const std::string& output, double second
                                   : fmt::format("{} not sound", unsound),
                      seconds);
     if (missed > 0) spdlog::warn("{} frames missed the tolerance", missed);
-    if (unlike > 0)
-        spdlog::warn("{} meshes have another number of components or handles than their level sets", unlike);
+    if (unlike > 0) spdlog::warn("{} frames have another topology than their level sets", unlike);
     if (failed > 0 && report.frames.size() > 1)
         spdlog::error("{} of {} frames failed", failed, report.frames.size());
 }

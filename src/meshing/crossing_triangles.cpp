@@ -1,5 +1,8 @@
 #include "meshing/crossing_triangles.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "isotrack/meshing/self_intersections.h"
 #include "meshing/triangle_bins.h"
 
@@ -15,7 +18,9 @@ std::vector<char> crossing_triangles(const std::vector<Vec3>& points, const std:
         some.push_back(triangles[t]);
         around.extend(box_of(points, triangles[t]));
     }
-    const TriangleBins bins(points, some, 0.0);
+    // As large as they are; those that are all points have no size.
+    const double size = std::max(1e-6 * around.diagonal().norm(), std::numeric_limits<double>::min());
+    const TriangleBins bins(points, some, size);
     TriangleMesh near;
     near.points = points;
     std::vector<std::size_t> of;  // triangle of each that is near

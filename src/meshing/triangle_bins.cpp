@@ -46,9 +46,7 @@ std::vector<int> TriangleBins::meeting(const Box& box) const {
 }
 
 bool TriangleBins::any_meets(const Box& box) const {
-    bool result = false;
-    for_each_in(range_of(box), [&](int t) { result = result || box_of(t).intersects(box); });
-    return result;
+    return any_in(range_of(box), [&](int t) { return box_of(t).intersects(box); });
 }
 
 TriangleBins::Range TriangleBins::range_of(const Box& box) const {

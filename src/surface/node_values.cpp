@@ -4,7 +4,7 @@
 
 namespace isotrack {
 
-// Apart from what is asked all the time, so that the compiler puts that in line.
+// Out of line, so that the compiler inlines `at` and `block`.
 
 void NodeValues::fetch(const Coord& node, const Coord& at, Place& place) {
     place.leaf = at;

@@ -26,7 +26,8 @@ public:
     template <int N>
     void block(const Coord& low, float (&v)[N][N][N]) {
         static_assert(N <= kLeafDim, "two leaves in a row hold all");
-        // What leaf a node is in is computed, not asked: it changes from cell to cell and is seldom foreseen.
+        // The leaf of a node is found without a branch, which would be mispredicted: it changes from cell to
+        // cell.
         const int x = low.x() & kMask, y = low.y() & kMask, z = low.z() & kMask;
         Place& place = place_of(low);
         const auto for_each_column = [&](const auto& read) {

@@ -196,8 +196,8 @@ Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     doubt(measure_errors(mesh, result), kVainSpacing, result);
     measured_ = true;
     if (!changes_.many)
-        changes_.around =
-            triangles_around(changes_.went, kAroundChanges * cutoff(), mesh.vertices, mesh.carved.triangles);
+        changes_.around = triangles_near_gone(changes_.went, kAroundChanges * cutoff(), mesh.vertices,
+                                              mesh.carved.triangles);
     for (std::size_t d = 0; d < distances_.size(); ++d) {
         distances_[d].measure(mesh.vertices, mesh.carved.triangles, changes_);
         take_missed(d, result);

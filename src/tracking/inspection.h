@@ -65,7 +65,8 @@ public:
     /// there when it was inspected is no matter.
     std::vector<Surface::Crossing> newly_missed(const Inspection& now, const std::vector<Vec3>& vertices,
                                                 const std::vector<Triangle>& triangles) const;
-    /// As `inspect` finds them, of triangles of three corners each; the first is the one of the least number.
+    /// As `inspect` finds them, of triangles of three corners each, from the corner with the least number on:
+    /// their last digits depend on the order.
     std::vector<TriangleError> errors_of(const std::vector<Vec3>& corners) const;
     /// The points between crossings found so far.
     const std::deque<CrossingGrid>& between() const { return between_; }

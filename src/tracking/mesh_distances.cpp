@@ -10,9 +10,9 @@
 
 namespace isotrack {
 
-std::vector<Triangle> triangles_around(const std::vector<Facet>& went, double reach,
-                                       const std::vector<Vec3>& vertices,
-                                       const std::vector<Triangle>& triangles) {
+std::vector<Triangle> triangles_near_gone(const std::vector<Facet>& went, double reach,
+                                          const std::vector<Vec3>& vertices,
+                                          const std::vector<Triangle>& triangles) {
     Box box;
     for (const Facet& facet : went)
         for (const Eigen::Vector3f& corner : facet.corner) box.extend(corner.cast<double>());

@@ -20,9 +20,9 @@ struct FacetChanges {
 };
 
 /// The triangles in a box around `went` that reaches so far beyond it.
-std::vector<Triangle> triangles_around(const std::vector<Facet>& went, double reach,
-                                       const std::vector<Vec3>& vertices,
-                                       const std::vector<Triangle>& triangles);
+std::vector<Triangle> triangles_near_gone(const std::vector<Facet>& went, double reach,
+                                          const std::vector<Vec3>& vertices,
+                                          const std::vector<Triangle>& triangles);
 
 class MeshDistances {
 public:

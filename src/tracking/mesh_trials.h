@@ -22,12 +22,12 @@ public:
     /// Takes a mesh if it misses nothing that the one there does not, and if its largest distances either way
     /// are within the tolerance or no larger. Returns whether it did.
     bool try_mesh(FrameMesh other);
-    /// Whether triangles, of three corners each, are near enough to the surface for a mesh that is taken.
-    bool may_have(const std::vector<Vec3>& corners) const;
     /// Takes a mesh if moreover it fails at fewer places.
     bool try_to_mend(FrameMesh other);
     /// Takes a mesh that was there before.
     void put_back(FrameMesh mesh);
+    /// Whether triangles, of three corners each, are near enough to the surface for a mesh that is taken.
+    bool may_have(const std::vector<Vec3>& corners) const;
     /// Where a triangle is too far off, what is missed, and where a triangle is turned over.
     std::vector<Vec3> failing_places() const;
 

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
@@ -28,19 +30,23 @@ constexpr double kCovered = 2.0;  // so far apart they leave nothing out
 constexpr double kAround = 2.5;   // the middles of other patches for what fails
 constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
 constexpr double kLatticeReach = 24.0;
-constexpr double kFlat = 1e-3;  // twice the area over the square of the longest edge
+constexpr double kMostArea = 50000.0,
+                 kMostAreaOfPlace = 50.0;  // square: what goes, for all patches, for one
+constexpr double kFlat = 1e-3;             // twice the area over the square of the longest edge
 constexpr std::size_t kMostFailing = 64, kMostPlaces = 300;
-constexpr int kMostPatches = 1000, kMostRefused = 50;  // that are made, and whose meshes are inspected
-constexpr std::size_t kMostTriangles = 10000000;       // of the whole meshes they make
-constexpr std::size_t kMostEverywhere = 20000;         // places all over a mesh
-constexpr long kMostAstray = 30;                       // components and handles, to look for them there
-constexpr std::size_t kMostPairs = 100000000;          // of components
+constexpr int kMostPatches = 1000, kMostTooFar = 50, kMostRefused = 50;  // see Effort
+constexpr std::size_t kMostTriangles = 10000000;                         // of the whole meshes they make
+constexpr std::size_t kMostEverywhere = 20000;                           // places all over a mesh
+constexpr long kMostAstray = 30;               // components and handles, to look for them there
+constexpr std::size_t kMostPairs = 100000000;  // of components
 
-/// Those of some places that are not near to one before.
-std::vector<Vec3> apart(const std::vector<Vec3>& places, double distance) {
+/// Those of some places that are not near to one before; of very many the first.
+std::vector<Vec3> apart(const std::vector<Vec3>& places, double distance,
+                        std::size_t most = std::numeric_limits<std::size_t>::max()) {
     std::map<std::array<double, 3>, std::vector<Vec3>> in_cube;
     std::vector<Vec3> result;
     for (const Vec3& place : places) {
+        if (result.size() == most) break;
         const Vec3 cube = (place / distance).array().floor();
         bool is_near = false;
         for (int n = 0; n < 27; ++n) {
@@ -133,23 +139,56 @@ bool has_flat_triangle(const std::vector<Vec3>& corners) {
     return false;
 }
 
-/// Those of some places where a patch would change the numbers, and then those where it does not fit.
-std::vector<Vec3> doubtful(const std::vector<Vec3>& places, const FrameMesh& mesh, const Surface& surface) {
+double area_of(const std::vector<int>& triangles, const FrameMesh& mesh) {
+    double twice = 0.0;
+    for (const int t : triangles) {
+        const auto& [i, j, k] = mesh.carved.triangles[t];
+        twice += (mesh.vertices[j] - mesh.vertices[i]).cross(mesh.vertices[k] - mesh.vertices[i]).norm();
+    }
+    return 0.5 * twice;
+}
+
+/// Small handles anywhere, and where lattice nodes are joined across a face.
+std::vector<Vec3> other_places(const FrameMesh& mesh, const Surface& surface) {
+    const double resolution = surface.resolution();
+    std::vector<Vec3> result;
+    for (const int v : small_handles(mesh.vertices, mesh.carved.triangles,
+                                     std::vector<char>(mesh.vertices.size(), 1), kSmall * resolution))
+        result.push_back(mesh.vertices[v]);
+    for (const auto& diagonal : surface.diagonals()) result.push_back(0.5 * (diagonal.from + diagonal.to));
+    return apart(result, kApart * resolution, kMostPlaces);
+}
+
+/// Those of some places where a patch would change the numbers; where none fits, too, if `or_unfit`.
+std::vector<Vec3> unlike(const std::vector<Vec3>& places, const FrameMesh& mesh, const Surface& surface,
+                         bool or_unfit) {
     if (places.empty()) return {};
     const double resolution = surface.resolution();
     PatchSource lattice(surface.lattice_mesh(places, 4.0 * kSmall * resolution), resolution);
     const TriangleBins bins(mesh.vertices, mesh.carved.triangles, resolution);
-    enum Verdict : char { kSame, kUnlike, kUnfit };
-    std::vector<Verdict> verdict(places.size());
+    std::vector<char> is_unlike(places.size());
     tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
         const auto patch = patch_for(triangles_around(places[p], kSmall * resolution, bins), bins, lattice);
-        verdict[p] = !patch ? kUnfit : patch->euler != 0 || patch->components != 0 ? kUnlike : kSame;
+        is_unlike[p] = patch ? patch->euler != 0 || patch->components != 0 : or_unfit;
     });
-    std::vector<Vec3> result;
-    for (const Verdict wanted : {kUnlike, kUnfit})
-        for (std::size_t p = 0; p < places.size(); ++p)
-            if (verdict[p] == wanted) result.push_back(places[p]);
+    std::vector<Vec3> result = places;
+    compact(result, is_unlike);
     return result;
+}
+
+/// Where the mesh may have another topology than the lattice although nothing tells. All of a mesh is looked
+/// at where it is not too large, nor its triangles: what goes of the lattice then is large as well.
+std::vector<Vec3> places_anywhere(const FrameMesh& mesh, const Surface& surface, long astray) {
+    const double resolution = surface.resolution();
+    if (astray <= kMostAstray) {
+        const std::vector<Vec3> all = apart(mesh.vertices, kCovered * resolution, kMostEverywhere + 1);
+        std::vector<int> triangles(mesh.carved.triangles.size());
+        std::iota(triangles.begin(), triangles.end(), 0);
+        const double area = area_of(triangles, mesh) / (resolution * resolution);
+        if (all.size() <= kMostEverywhere && area <= kMostAreaOfPlace * static_cast<double>(all.size()))
+            return unlike(all, mesh, surface, false);
+    }
+    return other_places(mesh, surface);
 }
 
 bool is_sound(const MeshTopology& topology) {
@@ -158,11 +197,16 @@ bool is_sound(const MeshTopology& topology) {
 
 /// What a search has tried, of all patchers that take part in it.
 struct Effort {
-    int patches = 0, refused = 0;  // those that are made, and those whose meshes are inspected in vain
-    std::size_t triangles = 0;     // of the whole meshes they make
+    int patches = 0;            // that are made
+    double area = 0.0;          // square resolutions, of what goes for them
+    int too_far = 0;            // of these: wanted, but farther from the surface than a mesh that is taken
+    int refused = 0;            // meshes that are inspected in vain
+    std::size_t triangles = 0;  // of the whole meshes that are made
+    bool anywhere = false;      // whether all of the mesh was looked at
 
     bool is_enough() const {
-        return patches >= kMostPatches || refused >= kMostRefused || triangles > kMostTriangles;
+        return patches >= kMostPatches || area > kMostArea || too_far >= kMostTooFar ||
+               refused >= kMostRefused || triangles > kMostTriangles;
     }
 };
 
@@ -183,9 +227,9 @@ public:
         lattice_.forget();
         try_again();
     }
-    /// Takes the patch within `reach` resolutions of a place if it is wanted by its own numbers and then by
-    /// those of the whole mesh, if it crosses nothing, and if its mesh is taken: `try_mesh`. Returns whether;
-    /// nullopt where it was wanted and failed.
+    /// Takes the patch within `reach` resolutions of a place if it is wanted by its own numbers, near enough
+    /// to the surface, wanted by the numbers of the whole mesh, if it crosses nothing, and if its mesh is
+    /// taken: `try_mesh`. Returns whether; nullopt where it was wanted by all numbers and failed then.
     template <typename IsWanted, typename AreWanted, typename TryMesh>
     std::optional<bool> patch_at(const Vec3& place, double reach, const IsWanted& is_wanted,
                                  const AreWanted& are_wanted, const TryMesh& try_mesh) {
@@ -194,20 +238,20 @@ public:
         std::vector<int> gone = triangles_around(place, reach * resolution_, *bins_);
         if (tried_.count(gone) > 0) return false;
         ++effort_.patches;
+        effort_.area += area_of(gone, mesh) / (resolution_ * resolution_);
         const auto patch = patch_for(gone, *bins_, lattice_);
         tried_.insert(std::move(gone));
         if (!patch || !is_wanted(*patch)) return false;
         const std::vector<Vec3> corners = corners_of(*patch, mesh);
-        if (has_flat_triangle(corners)) return std::nullopt;
         if (!trials_.may_have(corners)) {
-            ++effort_.refused;
-            return std::nullopt;
+            ++effort_.too_far;
+            return false;
         }
         effort_.triangles += mesh.carved.triangles.size();
         FrameMesh other = patched(mesh, *patch);
         const MeshTopology topology = topology_of(other);
         if (!is_sound(topology) || !are_wanted(topology)) return false;
-        if (crosses(*patch, mesh)) return std::nullopt;
+        if (has_flat_triangle(corners) || crosses(*patch, mesh)) return std::nullopt;
         if (!try_mesh(std::move(other))) {
             ++effort_.refused;
             return std::nullopt;
@@ -244,13 +288,10 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     if (now == 0) return 0;
     const auto wanted = surface.lattice_components();
     if (!wanted) return 0;
-    std::vector<Vec3> likely = doubtful(places, trials.mesh(), surface);
+    std::vector<Vec3> likely = unlike(places, trials.mesh(), surface, true);
     const std::vector<Vec3> unmatched = unmatched_components(trials.mesh(), *wanted, resolution);
-    for (auto* some : {&likely, &places}) {
-        some->insert(some->end(), unmatched.begin(), unmatched.end());
-        if (some->size() > kMostPlaces) some->resize(kMostPlaces);
-    }
-    auto patcher = std::make_unique<Patcher>(trials, places, surface, effort);
+    for (auto* some : {&likely, &places}) some->insert(some->end(), unmatched.begin(), unmatched.end());
+    std::unique_ptr<Patcher> patcher;
     std::size_t count = 0;
     std::set<std::array<double, 3>> around;  // vertices where a patch would be right, but did not fit
     const auto patch_at = [&](const Vec3& place, double reach, long most) {
@@ -273,7 +314,11 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
                 if (now > 0 && !effort.is_enough()) patch_at(place, reach, now + worse);
         patcher->try_again();
     };
-    const auto search = [&](const std::vector<Vec3>& some) {
+    const auto search = [&](std::vector<Vec3> some) {
+        if (some.empty() || now == 0 || effort.is_enough()) return;
+        if (some.size() > kMostPlaces) some.resize(kMostPlaces);
+        patcher = std::make_unique<Patcher>(trials, some, surface, effort);
+        around.clear();
         patch_near(some, -1);
         std::vector<Vec3> more;
         for (const auto& [x, y, z] : around) more.emplace_back(x, y, z);
@@ -283,18 +328,8 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         patch_near(some, -1);
     };
     search(likely);
-    // Nothing may tell where the fault is.
-    const std::vector<Vec3> all = apart(trials.mesh().vertices, kCovered * resolution);
-    if (now > 0 && now <= kMostAstray && all.size() <= kMostEverywhere && !effort.is_enough()) {
-        std::vector<Vec3> others = doubtful(all, trials.mesh(), surface);
-        if (others.size() > kMostPlaces) others.resize(kMostPlaces);
-        patcher = std::make_unique<Patcher>(trials, others, surface, effort);
-        around.clear();
-        search(others);
-    }
-    if (now == 0 || effort.is_enough()) return count;
-    patcher = std::make_unique<Patcher>(trials, places, surface, effort);
-    around.clear();
+    if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true))
+        search(places_anywhere(trials.mesh(), surface, now));
     search(places);
     return count;
 }

@@ -289,7 +289,7 @@ TEST(MeshDistances, AfterChangesAreThoseMeasuredAnew) {
             changes.went = around(5);
             std::swap(mesh, changed);
             changes.came = around(5);
-            changes.around = triangles_around(changes.went, 2.01 * cutoff, mesh.points, mesh.triangles);
+            changes.around = triangles_near_gone(changes.went, 2.01 * cutoff, mesh.points, mesh.triangles);
             distances.measure(mesh.points, mesh.triangles, changes);
             const auto anew = crossing_distances(mesh.points, mesh.triangles, grid, cutoff);
             std::swap(mesh, changed);
@@ -297,6 +297,38 @@ TEST(MeshDistances, AfterChangesAreThoseMeasuredAnew) {
             EXPECT_NE(anew, before);
             for (std::size_t c = 0; c < grid.size(); ++c) EXPECT_EQ(distances[c], anew[c]) << c;
         }
+}
+
+TEST(MeshDistances, WhatTakesOverMayBeTwoCutoffsFromWhatWent) {
+    // Crossings between two sheets, nearer to the one that goes.
+    constexpr double kCutoff = 1.0, kGap = 1.8;
+    std::vector<Surface::Crossing> crossings;
+    for (double x = -1.0; x <= 1.0; x += 0.25)
+        crossings.push_back({Vec3(x, 0.1, 0.85), Eigen::Vector3f::UnitZ()});
+    const CrossingGrid grid(crossings, 0.25);
+    const auto sheet = [](double z) { return std::vector<Vec3>{{-3, -3, z}, {3, -3, z}, {0, 3, z}}; };
+    const std::vector<Triangle> triangles{{0, 1, 2}, {3, 4, 5}};
+    const auto points_with = [&](double z) {
+        std::vector<Vec3> points = sheet(kGap);
+        const std::vector<Vec3> other = sheet(z);
+        points.insert(points.end(), other.begin(), other.end());
+        return points;
+    };
+    const auto facet = [&](double z) {
+        const std::vector<Vec3> corner = sheet(z);
+        return Facet{0, {corner[0].cast<float>(), corner[1].cast<float>(), corner[2].cast<float>()}};
+    };
+    MeshDistances distances(grid, kCutoff);
+    distances.measure(points_with(0.0), triangles, {});
+    FacetChanges changes;
+    changes.went = {facet(0.0)};
+    changes.came = {facet(-5.0)};
+    const std::vector<Vec3> now = points_with(-5.0);
+    changes.around = triangles_near_gone(changes.went, 2.01 * kCutoff, now, triangles);
+    distances.measure(now, triangles, changes);
+    for (std::size_t c = 0; c < grid.size(); ++c) EXPECT_NEAR(distances[c], kGap - 0.85, 1e-6) << c;
+
+    EXPECT_EQ(triangles_near_gone(changes.went, 0.9 * kGap, now, triangles).size(), 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Tolerances, RefitOfABox, ::testing::Values(0.02, 0.05, 0.2));
@@ -318,6 +350,14 @@ struct Inspected {
         inspector.inspect_topology(mesh, inspection);
     }
 };
+
+/// Three for each triangle.
+std::vector<Vec3> corners_of(const FrameMesh& mesh) {
+    std::vector<Vec3> result;
+    for (const Triangle& t : mesh.carved.triangles)
+        for (const int v : t) result.push_back(mesh.vertices[v]);
+    return result;
+}
 
 /// A disk of one layer of lattice nodes, which are inside by little: about a third of a voxel thick. Beside
 /// it a ball, so that the values inside are known for distances.
@@ -465,8 +505,10 @@ TEST(MeshTrials, TakeNoMeshThatIsFartherOffOrMissesMore) {
     for (const double dent : {0.9, -0.9}) {
         FrameMesh other = before;
         other.vertices[farthest].y() -= dent;
+        EXPECT_FALSE(now.trials.may_have(corners_of(other)));
         EXPECT_FALSE(now.trials.try_mesh(other));
     }
+    EXPECT_TRUE(now.trials.may_have(corners_of(before)));
     // Without the drop: no triangle is farther off.
     std::vector<char> of_drop;
     for (const Triangle& t : before.carved.triangles) of_drop.push_back(before.vertices[t[0]].x() > 6.3);

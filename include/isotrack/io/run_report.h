@@ -38,7 +38,8 @@ struct FrameReport {
     std::string status = "ok";  ///< "ok", "empty", "skipped", "failed", "tolerance_not_met".
     std::string message;
 
-    /// The mesh has components or handles that the level set does not have, or lacks some.
+    /// By the Euler number: the mesh has components or handles that the level set does not have, or lacks
+    /// some. Of two such faults one may hide the other.
     bool has_other_topology() const { return surface_euler && !opened && euler != *surface_euler; }
 };
 
