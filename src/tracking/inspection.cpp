@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "find_in_blocks.h"
 #include "sampling/compact.h"
 #include "surface/lattice_scan.h"
 #include "surface/surface_near.h"
@@ -58,6 +59,34 @@ std::optional<Shortage> crease_shortage(const FrameMesh& mesh, const Particles& 
     if (edge(0).cross(edge(1)).norm() < kLeastHeight * detail * longest) return std::nullopt;
     const auto& at = particles.position;
     return Shortage{0.5 * (at[corner[(k + 1) % 3]] + at[corner[(k + 2) % 3]]), kSpacing * longest};
+}
+
+/// Ascending.
+std::vector<Vec3> crossings_around(const std::vector<Vec3>& places, const Surface& surface) {
+    const Eigen::Affine3d lattice = surface.lattice(), to_lattice = lattice.inverse();
+    const double reach = kFaultReach * surface.resolution();
+    const Vec3 extent = reach * to_lattice.linear().rowwise().norm();
+    constexpr std::size_t kPlacesPerBlock = 32;
+    auto found = find_in_blocks<std::array<double, 3>>(
+        places.size(), kPlacesPerBlock,
+        [&](std::size_t begin, std::size_t end, std::vector<std::array<double, 3>>& near) {
+            const auto probe = surface.probe();
+            for (std::size_t i = begin; i < end; ++i) {
+                const Vec3 middle = to_lattice * places[i];
+                const Vec3 from = (middle - extent).array().floor(), to = (middle + extent).array().ceil();
+                const Eigen::Array3i size = (to - from).cast<int>().array() + 1;
+                scan_lattice(*probe, lattice, from, size,
+                             [&](const Vec3& node, int axis, double fraction, bool) {
+                                 const Vec3 p = lattice * (node + fraction * Vec3::Unit(axis));
+                                 if ((p - places[i]).norm() <= reach) near.push_back({p.x(), p.y(), p.z()});
+                             });
+            }
+        });
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    std::vector<Vec3> result;
+    for (const auto& [x, y, z] : found) result.emplace_back(x, y, z);
+    return result;
 }
 
 /// After the fit, too.
@@ -176,9 +205,11 @@ void Inspector::take_missed(std::size_t d, Inspection& result) {
     }
     doubt(in_vain, kVainSpacing, result);
     if (d > 0) {  // they are not among the crossings around them
+        std::vector<Shortage> at;
         for (const int i : survey.beyond)
-            result.doubtful.push_back({distances_[d].points()[i].point, kVainSpacing * surface_.resolution(),
-                                       kLeastDoubtful * surface_.resolution()});
+            at.push_back({distances_[d].points()[i].point, kVainSpacing * surface_.resolution(),
+                          kLeastDoubtful * surface_.resolution()});
+        result.doubts.push_back({{}, 0.0, std::move(at)});
     } else if (survey.weight > 0.0) {
         result.crossings_mean_square = survey.sum_of_squares / survey.weight;
     }
@@ -266,26 +297,7 @@ void Inspector::forget_distances() {
 }
 
 void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const {
-    if (places.empty()) return;
-    const Eigen::Affine3d lattice = surface_.lattice(), to_lattice = lattice.inverse();
-    const double reach = kFaultReach * surface_.resolution();
-    const Vec3 extent = reach * to_lattice.linear().rowwise().norm();
-    const auto probe = surface_.probe();
-    std::vector<std::array<double, 3>> found;
-    for (const Vec3& place : places) {
-        const Vec3 middle = to_lattice * place;
-        const Vec3 from = (middle - extent).array().floor(), to = (middle + extent).array().ceil();
-        const Eigen::Array3i size = (to - from).cast<int>().array() + 1;
-        scan_lattice(*probe, lattice, from, size, [&](const Vec3& node, int axis, double fraction, bool) {
-            const Vec3 p = lattice * (node + fraction * Vec3::Unit(axis));
-            if ((p - place).norm() <= reach) found.push_back({p.x(), p.y(), p.z()});
-        });
-    }
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    for (const auto& p : found)
-        inspection.doubtful.push_back({Vec3(p[0], p[1], p[2]), spacing * surface_.resolution(),
-                                       kLeastDoubtful * surface_.resolution()});
+    if (!places.empty()) inspection.doubts.push_back({places, spacing * surface_.resolution(), {}});
 }
 
 void Inspector::prepare_topology() {
@@ -305,10 +317,13 @@ void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) 
         }
         doubt(places, kVainSpacing, inspection);
     }
-    if (looks_ == 0)  // what is not mended then seldom is
+    if (looks_ == 0) {  // what is not mended then seldom is
+        std::vector<Shortage> at;
         for (const auto& diagonal : inspection.topology.parted)
             for (const Vec3& place : diagonal.beside)
-                inspection.doubtful.push_back({place, kFaultSpacing * surface_.resolution()});
+                at.push_back({place, kFaultSpacing * surface_.resolution()});
+        inspection.doubts.push_back({{}, 0.0, std::move(at)});
+    }
     ++looks_;
 }
 
@@ -348,7 +363,11 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     for (const auto& c : inspection.missed)
         result.push_back(
             {c.point, kMissedSpacing * std::max(surface.resolution(), kMissedAt * limits.tolerance)});
-    result.insert(result.end(), inspection.doubtful.begin(), inspection.doubtful.end());
+    for (const Doubt& doubt : inspection.doubts) {
+        for (const Vec3& p : crossings_around(doubt.places, surface))
+            result.push_back({p, doubt.spacing, kLeastDoubtful * surface.resolution()});
+        result.insert(result.end(), doubt.at.begin(), doubt.at.end());
+    }
     for (const auto& e : carved.complex_edges)
         result.push_back({0.5 * (particles.position[e.from] + particles.position[e.to]),
                           0.7 * std::min(particles.spacing[e.from], particles.spacing[e.to])});

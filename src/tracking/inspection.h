@@ -20,6 +20,13 @@
 
 namespace isotrack {
 
+/// Where particles may be missing.
+struct Doubt {
+    std::vector<Vec3> places;  ///< At the lattice crossings around them;
+    double spacing = 0.0;      ///< as far from others, world units.
+    std::vector<Shortage> at;  ///< And there.
+};
+
 struct Inspection {
     std::shared_ptr<const std::vector<TriangleError>> errors;  ///< Per triangle; the inspector has them, too.
     /// Farther from the mesh than the tolerance: crossings, and points of the surface between such as are
@@ -29,8 +36,7 @@ struct Inspection {
     double crossings_mean_square = 0.0;  ///< Of the crossings that were found.
     std::size_t lost_crossings = 0;      ///< Of these and those: not found.
     LatticeTopology topology;
-    std::vector<Shortage>
-        doubtful;  ///< Crossings near its faults and near what was mended in vain, and all missed between.
+    std::vector<Doubt> doubts;  ///< Near its faults and near what was mended in vain, and all missed between.
 };
 
 /// The largest of `errors` (one per triangle) around each of so many particles; negative without a triangle.
@@ -91,7 +97,7 @@ private:
                          Inspection& inspection);
     void forget_distances();
     double cutoff() const;
-    /// Adds the lattice crossings near some places to the doubtful ones; `spacing` in resolutions.
+    /// `spacing` in resolutions.
     void doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const;
 
     const Surface& surface_;

@@ -74,7 +74,7 @@ bool MeshTrials::take(FrameMesh other, std::size_t most_failing) {
         // What it saw last was another, for which it may have looked at more points.
         Inspection now = inspector_.inspect_both_ways(mesh_);
         now.topology = std::move(inspection_.topology);
-        now.doubtful = std::move(inspection_.doubtful);
+        now.doubts = std::move(inspection_.doubts);
         inspection_ = std::move(now);
     }
     return good;
