@@ -39,11 +39,11 @@ public:
         const openvdb::Coord base = split(index, t);
         float v[4][4][4];  // v[i + 1][j + 1][k + 1] at base + (i, j, k)
         nodes_.block(base.offsetBy(-1), v);
-        using Column = Eigen::Array4f;  // along the third axis
-        const auto column = [&](int i, int j) { return Eigen::Map<const Column>(v[i][j]); };
-        const float w[3][2] = {{static_cast<float>(1.0 - t.x()), static_cast<float>(t.x())},
-                               {static_cast<float>(1.0 - t.y()), static_cast<float>(t.y())},
-                               {static_cast<float>(1.0 - t.z()), static_cast<float>(t.z())}};
+        using Column = Eigen::Array4d;  // along the third axis
+        const auto column = [&](int i, int j) {
+            return Eigen::Map<const Eigen::Array4f>(v[i][j]).cast<double>();
+        };
+        const double w[3][2] = {{1.0 - t.x(), t.x()}, {1.0 - t.y(), t.y()}, {1.0 - t.z(), t.z()}};
         Column across[4], along[4];  // interpolated along the second axis, along the first
         for (int i = 0; i < 4; ++i) {
             across[i] = w[1][0] * column(i, 1) + w[1][1] * column(i, 2);
