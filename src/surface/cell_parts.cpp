@@ -114,7 +114,7 @@ long parts_below(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
 }  // namespace
 
 long cell_parts(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
-    return parts_in(leaf, sides, reader) + parts_below(leaf, sides, reader);
+    return (sides.are_mixed() ? parts_in(leaf, sides, reader) : 0) + parts_below(leaf, sides, reader);
 }
 
 }  // namespace isotrack

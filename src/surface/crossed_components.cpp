@@ -19,7 +19,7 @@ using openvdb::Coord;
 /// The numbers of crossed edges by their lower end and axis.
 class EdgeNumbers {
 public:
-    explicit EdgeNumbers(const std::vector<CrossedEdge>& edges) : edges_(edges), places_(size_for(edges)) {
+    explicit EdgeNumbers(const UnsetVector<CrossedEdge>& edges) : edges_(edges), places_(size_for(edges)) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, edges.size(), 4096), [&](const auto& range) {
             for (std::size_t e = range.begin(); e < range.end(); ++e) {
                 std::size_t at = place_of(edges[e].from, edges[e].axis);
@@ -42,7 +42,7 @@ public:
     }
 
 private:
-    static std::size_t size_for(const std::vector<CrossedEdge>& edges) {
+    static std::size_t size_for(const UnsetVector<CrossedEdge>& edges) {
         std::size_t size = 64;
         while (size < 2 * edges.size()) size *= 2;
         return size;
@@ -54,7 +54,7 @@ private:
         return static_cast<std::size_t>(mixed >> 20) & (places_.size() - 1);
     }
 
-    const std::vector<CrossedEdge>& edges_;
+    const UnsetVector<CrossedEdge>& edges_;
     std::vector<std::atomic<std::uint32_t>> places_;  // one more than the number; 0: free
 };
 
@@ -178,7 +178,7 @@ private:
 }  // namespace
 
 std::size_t count_components(const CrossedEdges& crossed, const openvdb::FloatTree& tree) {
-    const std::vector<CrossedEdge>& edges = crossed.edges;
+    const UnsetVector<CrossedEdge>& edges = crossed.edges;
     const EdgeNumbers numbers(edges);
     SharedSets sets(edges.size());
     return tbb::parallel_reduce(

@@ -1,17 +1,13 @@
 #include "surface/crossed_edges.h"
 
 #include <openvdb/tree/LeafManager.h>
-#include <tbb/parallel_sort.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <map>
+#include <atomic>
+#include <bitset>
 #include <numeric>
-#include <utility>
 
-#include "find_in_blocks.h"
 #include "surface/cell_parts.h"
 
 namespace isotrack {
@@ -23,7 +19,6 @@ using Leaf = FloatTree::LeafNodeType;
 using Bits = std::uint64_t;
 
 constexpr int kDim = LeafSides::kDim;
-constexpr std::size_t kLeavesPerBlock = 64;
 
 /// Calls `visit(bit)` for each that is set.
 template <typename Visit>
@@ -39,74 +34,115 @@ int offset_in(int axis, int at, int i) {
     return at * kStride[axis] + u * kStride[axis == 0 ? 1 : 0] + w * kStride[axis == 2 ? 1 : 2];
 }
 
-void add_edges_of(const Leaf& leaf, const LeafSides& sides, const FloatTree& tree, TreeReader& reader,
-                  std::vector<CrossedEdge>& found) {
-    const float* own = leaf.buffer().data();
-    const Coord origin = leaf.origin();
-    constexpr int kNotLookedAt = 7;
-    const auto add = [&](const Coord& from, int axis, float a, float b, bool active, int saddles) {
-        const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
-        found.push_back({from, fraction, static_cast<std::int8_t>(axis), a < 0.0f, !active,
-                         static_cast<std::uint8_t>(saddles)});
-    };
-    const auto is_on = [](const Leaf& of, int offset) {
-        return of.isValueOn(static_cast<openvdb::Index>(offset));
-    };
-    constexpr Bits kNotLastY = 0x00ffffffffffffff, kNotLastZ = 0x7f7f7f7f7f7f7f7f;
+/// The edges along each axis that have both ends in a leaf, the lower one in layer `x` of it: by their lower
+/// ends. `next`: the layer above, or once more this one where that is in another leaf.
+struct LayerEdges {
+    Bits along[3];
+
+    LayerEdges(Bits here, Bits next)
+        : along{here ^ next, (here ^ here >> kDim) & kNotLastY, (here ^ here >> 1) & kNotLastZ} {}
+
+    static constexpr Bits kNotLastY = 0x00ffffffffffffff, kNotLastZ = 0x7f7f7f7f7f7f7f7f;
+};
+
+/// Calls `visit(x, here, edges)` for each layer of a leaf.
+template <typename Visit>
+void for_each_layer(const LeafSides& sides, const Visit& visit) {
     Bits next = sides.layer(0, 0);
     for (int x = 0; x < kDim; ++x) {
         const Bits here = next;
         if (x + 1 < kDim) next = sides.layer(0, x + 1);
-        const Bits crossed[3] = {here ^ next, (here ^ here >> kDim) & kNotLastY,
-                                 (here ^ here >> 1) & kNotLastZ};
-        // Of the faces that an edge spans with one along a further axis; those that leave the leaf may be
-        // any.
-        const auto saddles = [](Bits edges, Bits opposite, Bits beside, Bits within) {
-            return ~within | (edges & opposite & beside);
-        };
-        const Bits along_y[3] = {saddles(crossed[0], crossed[0] >> kDim, here ^ here >> kDim, kNotLastY), 0,
-                                 0};
-        const Bits along_z[3] = {
-            saddles(crossed[0], crossed[0] >> 1, here ^ here >> 1, kNotLastZ),
-            saddles(here ^ here >> kDim, (here ^ here >> kDim) >> 1, here ^ here >> 1, kNotLastY & kNotLastZ),
-            0};
-        for (int axis = 0; axis < 3; ++axis)
-            for_each_bit(crossed[axis], [&](int bit) {
-                const int offset = kDim * kDim * x + bit, beyond = offset + kStride[axis];
-                add(origin + Leaf::offsetToLocalCoord(offset), axis, own[offset], own[beyond],
-                    is_on(leaf, offset) && is_on(leaf, beyond),
-                    static_cast<int>((along_y[axis] >> bit & 1) << 1 | (along_z[axis] >> bit & 1) << 2));
-            });
+        visit(x, here, LayerEdges(here, next));
     }
-    // Across the leaf's faces: upwards always, downwards only where no leaf sees the edge from below.
+}
+
+/// The edges that leave a leaf through one of its faces, by their ends in the leaf; `origin` is that of what
+/// is beyond, a leaf or a tile.
+struct FaceEdges {
+    int axis;
+    bool up;
+    Coord origin;
+    const Leaf* beyond;
+    Bits edges;
+};
+
+/// Calls `visit(FaceEdges)` for each face: upwards always, downwards only where no leaf sees the edges from
+/// below.
+template <typename Visit>
+void for_each_face(const Leaf& leaf, const LeafSides& sides, TreeReader& reader, const Visit& visit) {
     for (int axis = 0; axis < 3; ++axis) {
         Coord step(0);
         step[axis] = kDim;
-        const auto cross_into_tile = [&](bool up) {
-            const Coord there = up ? origin + step : origin - step;
-            const float tile = tree.getValue(there);
-            const bool active = tree.isValueOn(there);
-            const int at = up ? kDim - 1 : 0;
-            for_each_bit(sides.layer(axis, at) ^ (tile < 0.0f ? ~Bits{0} : 0), [&](int i) {
-                const int offset = offset_in(axis, at, i);
-                Coord from = origin + Leaf::offsetToLocalCoord(offset);
-                if (!up) from[axis] -= 1;
-                add(from, axis, up ? own[offset] : tile, up ? tile : own[offset],
-                    active && is_on(leaf, offset), kNotLookedAt);
-            });
-        };
-        if (const Leaf* above = reader.probeConstLeaf(origin + step)) {
-            const float* other = above->buffer().data();
-            for_each_bit(sides.layer(axis, kDim - 1) ^ sides.layer(axis, kDim), [&](int i) {
-                const int offset = offset_in(axis, kDim - 1, i), beyond = offset_in(axis, 0, i);
-                add(origin + Leaf::offsetToLocalCoord(offset), axis, own[offset], other[beyond],
-                    is_on(leaf, offset) && is_on(*above, beyond), kNotLookedAt);
-            });
-        } else {
-            cross_into_tile(true);
-        }
-        if (!reader.probeConstLeaf(origin - step)) cross_into_tile(false);
+        const Coord above = leaf.origin() + step, below = leaf.origin() - step;
+        visit(FaceEdges{axis, true, above, reader.probeConstLeaf(above),
+                        sides.layer(axis, kDim - 1) ^ sides.layer(axis, kDim)});
+        if (!reader.probeConstLeaf(below))
+            visit(FaceEdges{axis, false, below, nullptr,
+                            sides.layer(axis, 0) ^ (reader.getValue(below) < 0.0f ? ~Bits{0} : 0)});
     }
+}
+
+std::size_t count_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
+    std::size_t result = 0;
+    const auto add = [&](Bits edges) {
+        if (edges != 0) result += std::bitset<64>(edges).count();
+    };
+    if (sides.are_mixed())
+        for_each_layer(sides, [&](int, Bits, const LayerEdges& edges) {
+            for (const Bits along : edges.along) add(along);
+        });
+    for_each_face(leaf, sides, reader, [&](const FaceEdges& face) { add(face.edges); });
+    return result;
+}
+
+/// Writes them from `next` on, and returns how many of them are at the border.
+std::size_t write_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader& reader, CrossedEdge* next) {
+    const float* own = leaf.buffer().data();
+    constexpr int kNotLookedAt = 7;
+    std::size_t at_border = 0;
+    const auto add = [&](const Coord& from, int axis, float a, float b, bool active, int saddles) {
+        const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
+        *next++ = {from,     fraction, static_cast<std::int8_t>(axis),
+                   a < 0.0f, !active,  static_cast<std::uint8_t>(saddles)};
+        at_border += !active;
+    };
+    const auto is_on = [](const Leaf& of, int offset) {
+        return of.isValueOn(static_cast<openvdb::Index>(offset));
+    };
+    for_each_layer(sides, [&](int x, Bits here, const LayerEdges& edges) {
+        // Of the faces that an edge spans with one along a further axis; those that leave the leaf may be
+        // any.
+        const auto saddles = [](Bits some, Bits opposite, Bits beside, Bits within) {
+            return ~within | (some & opposite & beside);
+        };
+        constexpr Bits kNotLastY = LayerEdges::kNotLastY, kNotLastZ = LayerEdges::kNotLastZ;
+        const Bits along_x = edges.along[0], by_y = here ^ here >> kDim, by_z = here ^ here >> 1;
+        const Bits along_y[3] = {saddles(along_x, along_x >> kDim, by_y, kNotLastY), 0, 0};
+        const Bits along_z[3] = {saddles(along_x, along_x >> 1, by_z, kNotLastZ),
+                                 saddles(by_y, by_y >> 1, by_z, kNotLastY & kNotLastZ), 0};
+        for (int axis = 0; axis < 3; ++axis)
+            for_each_bit(edges.along[axis], [&](int bit) {
+                const int offset = kDim * kDim * x + bit, beyond = offset + kStride[axis];
+                add(leaf.offsetToGlobalCoord(offset), axis, own[offset], own[beyond],
+                    is_on(leaf, offset) && is_on(leaf, beyond),
+                    static_cast<int>((along_y[axis] >> bit & 1) << 1 | (along_z[axis] >> bit & 1) << 2));
+            });
+    });
+    for_each_face(leaf, sides, reader, [&](const FaceEdges& face) {
+        if (face.edges == 0) return;
+        const float tile = reader.getValue(face.origin);
+        const bool is_tile_on = reader.isValueOn(face.origin);
+        for_each_bit(face.edges, [&](int i) {
+            const int offset = offset_in(face.axis, face.up ? kDim - 1 : 0, i),
+                      there = offset_in(face.axis, face.up ? 0 : kDim - 1, i);
+            const float inner = own[offset], outer = face.beyond ? face.beyond->buffer().data()[there] : tile;
+            Coord from = leaf.offsetToGlobalCoord(offset);
+            if (!face.up) from[face.axis] -= 1;
+            add(from, face.axis, face.up ? inner : outer, face.up ? outer : inner,
+                is_on(leaf, offset) && (face.beyond ? is_on(*face.beyond, there) : is_tile_on), kNotLookedAt);
+        });
+    });
+    return at_border;
 }
 
 }  // namespace
@@ -114,226 +150,37 @@ void add_edges_of(const Leaf& leaf, const LeafSides& sides, const FloatTree& tre
 CrossedEdges find_crossed_edges(const FloatTree& tree) {
     const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
     const std::size_t count = leaves.leafCount();
-    std::vector<std::size_t> edges_of(count);  // how many, of each leaf
-    std::vector<long> parts_of(count);
-    CrossedEdges result;
-    result.edges = find_in_blocks<CrossedEdge>(
-        count, kLeavesPerBlock, [&](std::size_t begin, std::size_t end, std::vector<CrossedEdge>& found) {
+    const auto for_each_leaf = [&](const auto& visit) {
+        constexpr std::size_t kLeavesPerBlock = 512;
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kLeavesPerBlock), [&](const auto& range) {
             TreeReader reader(tree);
-            for (std::size_t n = begin; n < end; ++n) {
-                const std::size_t before = found.size();
-                const Leaf& leaf = leaves.leaf(n);
-                const LeafSides sides(leaf, reader);
-                add_edges_of(leaf, sides, tree, reader, found);
-                edges_of[n] = found.size() - before;
-                parts_of[n] = cell_parts(leaf, sides, reader);
-            }
+            LeafSigns signs;
+            for (std::size_t n = range.begin(); n < range.end(); ++n) visit(n, leaves.leaf(n), reader, signs);
         });
-    result.cell_parts = std::accumulate(parts_of.begin(), parts_of.end(), 0L);
-    std::size_t last = 0;
-    for (std::size_t n = 0; n < count; ++n) {
-        const std::size_t end = last + edges_of[n];
-        if (end > last) result.parts.push_back({leaves.leaf(n).origin(), last, end});
-        last = end;
-    }
+    };
+    // Counted first, so that each has its place in memory that is touched once.
+    std::vector<std::size_t> first(count + 1, 0);
+    std::vector<long> parts(count);
+    for_each_leaf([&](std::size_t n, const Leaf& leaf, TreeReader& reader, LeafSigns& signs) {
+        const LeafSides sides(leaf, reader, signs);
+        first[n + 1] = count_edges_of(leaf, sides, reader);
+        parts[n] = cell_parts(leaf, sides, reader);
+    });
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    CrossedEdges result;
+    result.edges.resize(first.back());
+    std::atomic<std::size_t> at_border{0};
+    for_each_leaf([&](std::size_t n, const Leaf& leaf, TreeReader& reader, LeafSigns& signs) {
+        if (first[n] < first[n + 1])
+            at_border +=
+                write_edges_of(leaf, LeafSides(leaf, reader, signs), reader, &result.edges[first[n]]);
+    });
+    for (std::size_t n = 0; n < count; ++n)
+        if (first[n] < first[n + 1])
+            result.parts.push_back({leaves.leaf(n).origin(), first[n], first[n + 1]});
+    result.cell_parts = std::accumulate(parts.begin(), parts.end(), 0L);
+    result.at_border = at_border;
     return result;
-}
-
-namespace {
-
-/// Which of the cubes of a leaf holds a node, or is next to one that is just below the leaf.
-std::size_t number_of(const Coord& in_leaf, int cube) {
-    const int across = kDim / cube;
-    const auto at = [&](int axis) { return std::max(in_leaf[axis], 0) / cube; };
-    return static_cast<std::size_t>((at(0) * across + at(1)) * across + at(2));
-}
-
-constexpr std::size_t kNone = ~std::size_t{0};
-
-/// The edges of a cube, where the surface may be a flat sheet.
-struct FlatCube {
-    int count[6] = {};  // of edges in each direction
-    // Of them all the lowest and the highest, as the surface faces there, and its corners: the farthest along
-    // the diagonals of the two axes that it is nearest to.
-    double low = kFar, high = -kFar;
-    double corner[4] = {-kFar, -kFar, -kFar, -kFar};
-    std::size_t at_corner[4] = {kNone, kNone, kNone, kNone};
-    bool flat = false;
-
-    static constexpr double kFar = std::numeric_limits<double>::infinity();
-    static int direction(const CrossedEdge& edge) { return 2 * edge.axis + edge.outward; }
-    int size() const { return std::accumulate(count, count + 6, 0); }
-    /// The sum of the directions: the normal of the surface.
-    Vec3 way() const { return Vec3(count[1] - count[0], count[3] - count[2], count[5] - count[4]); }
-    bool goes_one_way() const {
-        return (count[0] == 0 || count[1] == 0) && (count[2] == 0 || count[3] == 0) &&
-               (count[4] == 0 || count[5] == 0);
-    }
-    /// All edges are counted by now.
-    void take_place(std::size_t number, const CrossedEdge& edge) {
-        const Vec3 p = edge.index(), n = way();
-        const double height = n.dot(p);
-        low = std::min(low, height);
-        high = std::max(high, height);
-        int axis = 0;
-        n.cwiseAbs().maxCoeff(&axis);
-        const double u = p[(axis + 1) % 3], v = p[(axis + 2) % 3];
-        const double along[4] = {u + v, u - v, -u - v, v - u};
-        for (int k = 0; k < 4; ++k) {
-            if (!(along[k] > corner[k])) continue;
-            corner[k] = along[k];
-            at_corner[k] = number;
-        }
-    }
-    /// It is flat if it goes one way between two planes that are close together, and is no part of a drop.
-    void judge(int wide) {
-        constexpr double kThickness = 0.16, kLeastSpread = 0.5;  // of the cube's edge
-        flat = goes_one_way() && high - low <= kThickness * wide * way().norm() &&
-               std::max(corner[0] + corner[2], corner[1] + corner[3]) >= kLeastSpread * wide;
-    }
-    void choose(std::vector<StandIn>& found) const {
-        if (!flat) return;
-        std::array<std::size_t, 4> some{at_corner[0], at_corner[1], at_corner[2], at_corner[3]};
-        std::sort(some.begin(), some.end());
-        const auto end = std::unique(some.begin(), some.end());
-        const int chosen = static_cast<int>(end - some.begin());
-        for (int k = 0; k < chosen; ++k) found.push_back({some[k], (size() + k) / chosen, true});
-    }
-};
-
-/// The edges of a cube of a leaf, whatever they are like.
-struct AnyCube {
-    int count[3] = {};                                                 // of edges along each axis
-    std::size_t some[6] = {kNone, kNone, kNone, kNone, kNone, kNone};  // the last of each direction
-
-    void take(std::size_t number, const CrossedEdge& edge) {
-        ++count[edge.axis];
-        some[FlatCube::direction(edge)] = number;
-    }
-    void choose(std::vector<StandIn>& found) const {
-        const auto axis = std::max_element(count, count + 3) - count;
-        const int size = count[0] + count[1] + count[2];
-        const std::size_t in = some[2 * axis], out = some[2 * axis + 1];
-        const int of_in = in == kNone ? 0 : out == kNone ? size : size / 2;
-        if (in != kNone) found.push_back({in, of_in, false});
-        if (out != kNone) found.push_back({out, size - of_in, false});
-    }
-};
-
-/// The parts of the leaves in each cube of `wide` voxels, leaf by leaf where that is no larger than one.
-class PartsInCubes {
-public:
-    PartsInCubes(const std::vector<CrossedEdges::Part>& parts, int wide) {
-        if (wide <= kDim) {
-            for (std::size_t n = 0; n < parts.size(); ++n) order_.emplace_back(parts[n].origin, n);
-        } else {
-            for (std::size_t n = 0; n < parts.size(); ++n)
-                order_.emplace_back(parts[n].origin & ~(wide - 1), n);
-            tbb::parallel_sort(order_.begin(), order_.end());
-        }
-        for (std::size_t i = 0; i < order_.size(); ++i)
-            if (i == 0 || order_[i].first != order_[i - 1].first) first_.push_back(i);
-        first_.push_back(order_.size());
-    }
-    std::size_t size() const { return first_.size() - 1; }
-    /// Calls `visit` with the number of each part of a cube.
-    template <typename Visit>
-    void for_each_in(std::size_t cube, const Visit& visit) const {
-        for (std::size_t i = first_[cube]; i < first_[cube + 1]; ++i) visit(order_[i].second);
-    }
-
-private:
-    std::vector<std::pair<Coord, std::size_t>> order_;  // lowest corner of the cube, part
-    std::vector<std::size_t> first_;                    // of each cube, and the end
-};
-
-}  // namespace
-
-std::vector<StandIn> thin_out(const CrossedEdges& crossed, int cube, int wide) {
-    const auto cubes_of_leaf = [](int size) {
-        return static_cast<std::size_t>(size < kDim ? std::pow(kDim / size, 3) : 1);
-    };
-    const PartsInCubes parts(crossed.parts, wide);
-    const auto find = [&](std::size_t begin, std::size_t end, std::vector<StandIn>& found) {
-        std::vector<FlatCube> wide_cubes(cubes_of_leaf(wide));
-        std::vector<AnyCube> cubes(cubes_of_leaf(cube));
-        for (std::size_t n = begin; n < end; ++n) {
-            const auto for_each_edge = [&](const CrossedEdges::Part& part, const auto& visit) {
-                for (std::size_t e = part.begin; e < part.end; ++e) {
-                    const Coord in_leaf = crossed.edges[e].from - part.origin;
-                    visit(e, in_leaf, wide_cubes[wide < kDim ? number_of(in_leaf, wide) : 0]);
-                }
-            };
-            std::fill(wide_cubes.begin(), wide_cubes.end(), FlatCube());
-            parts.for_each_in(n, [&](std::size_t part) {
-                for_each_edge(crossed.parts[part], [&](std::size_t e, const Coord&, FlatCube& around) {
-                    ++around.count[FlatCube::direction(crossed.edges[e])];
-                });
-            });
-            parts.for_each_in(n, [&](std::size_t part) {
-                for_each_edge(crossed.parts[part], [&](std::size_t e, const Coord&, FlatCube& around) {
-                    if (around.goes_one_way()) around.take_place(e, crossed.edges[e]);
-                });
-            });
-            for (FlatCube& c : wide_cubes) c.judge(wide);
-            parts.for_each_in(n, [&](std::size_t part) {
-                bool any_other = false;
-                for_each_edge(crossed.parts[part],
-                              [&](std::size_t e, const Coord& in_leaf, const FlatCube& around) {
-                                  if (around.flat) return;
-                                  if (!any_other) std::fill(cubes.begin(), cubes.end(), AnyCube());
-                                  any_other = true;
-                                  cubes[number_of(in_leaf, cube)].take(e, crossed.edges[e]);
-                              });
-                if (any_other)
-                    for (const AnyCube& c : cubes) c.choose(found);
-            });
-            for (const FlatCube& c : wide_cubes) c.choose(found);
-        }
-    };
-    return find_in_blocks<StandIn>(parts.size(), kLeavesPerBlock, find);
-}
-
-namespace {
-
-/// Whether a leaf comes before another in the tree, by their origins: node by node from the root.
-bool comes_before(const Coord& a, const Coord& b) {
-    constexpr int kLog2Above[] = {12, 7, 0};  // of the edges of the root's children, of theirs, of a voxel
-    for (const int shift : kLog2Above)
-        if (const Coord x = a >> shift, y = b >> shift; x != y) return x < y;
-    return false;
-}
-
-}  // namespace
-
-std::vector<std::size_t> edges_near(const CrossedEdges& crossed, const std::vector<Vec3>& places,
-                                    double reach, int cube) {
-    const int across = kDim / cube;
-    const auto is_before = [](const Coord& a, const Coord& b) { return comes_before(a, b); };
-    std::map<Coord, std::vector<char>, decltype(is_before)> wanted(is_before);  // of each leaf, its cubes
-    auto at = wanted.end();                                                     // the leaf met last
-    for (const Vec3& place : places) {
-        const Eigen::Array3i low = ((place.array() - reach) / cube).floor().cast<int>(),
-                             high = ((place.array() + reach) / cube).floor().cast<int>();
-        for (int x = low.x(); x <= high.x(); ++x)
-            for (int y = low.y(); y <= high.y(); ++y)
-                for (int z = low.z(); z <= high.z(); ++z) {
-                    const Coord node(x * cube, y * cube, z * cube), origin = node & ~(kDim - 1);
-                    if (at == wanted.end() || at->first != origin)
-                        at = wanted.try_emplace(origin, across * across * across, 0).first;
-                    at->second[number_of(node - origin, cube)] = 1;
-                }
-    }
-    std::vector<std::size_t> found;
-    for (const auto& [origin, cubes] : wanted) {
-        const auto part = std::lower_bound(
-            crossed.parts.begin(), crossed.parts.end(), origin,
-            [](const CrossedEdges::Part& p, const Coord& there) { return comes_before(p.origin, there); });
-        if (part == crossed.parts.end() || part->origin != origin) continue;
-        for (std::size_t e = part->begin; e < part->end; ++e)
-            if (cubes[number_of(crossed.edges[e].from - origin, cube)]) found.push_back(e);
-    }
-    return found;
 }
 
 }  // namespace isotrack

@@ -2,37 +2,103 @@
 #pragma once
 
 #include <openvdb/openvdb.h>
+#ifdef __SSE__
+#include <xmmintrin.h>
+#endif
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace isotrack {
 
 /// An accessor that its tree does not know of, and must outlive it.
 using TreeReader = openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>;
 
-/// Of a leaf's nodes and those one beyond its upper ends.
-struct LeafSides {
+/// Which nodes of leaves are inside, remembered of those asked for last: their values are read once, though
+/// the leaves around them ask as well. For one thread.
+class LeafSigns {
+public:
     using Leaf = openvdb::FloatTree::LeafNodeType;
     static constexpr int kDim = Leaf::DIM;
     static_assert(kDim == 8, "a layer of a leaf is a word");
 
+    /// Bit 8 y + z of layer x.
+    using Layers = std::array<std::uint64_t, kDim>;
+
+    LeafSigns() : places_(kPlaces) {}
+    /// Until the next call.
+    const Layers& of(const Leaf& leaf) {
+        Place& place = places_[reinterpret_cast<std::uintptr_t>(&leaf) * kMix >> kShift];
+        if (place.leaf != &leaf) {
+            place.leaf = &leaf;
+            const float* values = leaf.buffer().data();
+            for (std::uint64_t& layer : place.layers) {
+                layer = 0;
+                for (int y = 0; y < kDim; ++y, values += kDim)
+                    layer |= static_cast<std::uint64_t>(negative(values)) << kDim * y;
+            }
+        }
+        return place.layers;
+    }
+
+private:
+    static constexpr int kShift = 64 - 11;
+    static constexpr std::size_t kPlaces = std::size_t{1} << 11;
+    static constexpr std::uint64_t kMix = 0x9e3779b97f4a7c15;
+    struct Place {
+        const Leaf* leaf = nullptr;
+        Layers layers;
+    };
+
+    /// Bit i: whether values[i] is below 0.
+    static unsigned negative(const float* values) {
+#ifdef __SSE__
+        const auto four = [](const float* v) {
+            return static_cast<unsigned>(_mm_movemask_ps(_mm_cmplt_ps(_mm_loadu_ps(v), _mm_setzero_ps())));
+        };
+        return four(values) | four(values + 4) << 4;
+#else
+        unsigned result = 0;
+        for (int i = 0; i < kDim; ++i) result |= static_cast<unsigned>(values[i] < 0.0f) << i;
+        return result;
+#endif
+    }
+
+    std::vector<Place> places_;
+};
+
+/// Of a leaf's nodes and those one beyond its upper ends.
+struct LeafSides {
+    using Leaf = LeafSigns::Leaf;
+    static constexpr int kDim = LeafSigns::kDim;
+
     /// Bit z of row (x, y).
     std::array<std::array<unsigned, kDim + 1>, kDim + 1> row{};
 
-    LeafSides(const Leaf& leaf, TreeReader& reader) {
+    LeafSides(const Leaf& leaf, TreeReader& reader, LeafSigns& signs) {
         for (int upper = 0; upper < 8; ++upper) {
             const int i = upper >> 2, j = upper >> 1 & 1, k = upper & 1;
             const openvdb::Coord at = leaf.origin().offsetBy(kDim * i, kDim * j, kDim * k);
             const Leaf* home = upper == 0 ? &leaf : reader.probeConstLeaf(at);
-            const unsigned tile = home == nullptr && reader.getValue(at) < 0.0f ? 0xffu : 0u;
+            LeafSigns::Layers tile;
+            if (!home) tile.fill(reader.getValue(at) < 0.0f ? ~std::uint64_t{0} : 0);
+            const LeafSigns::Layers& layers = home ? signs.of(*home) : tile;
             for (int x = 0; x < (i ? 1 : kDim); ++x)
                 for (int y = 0; y < (j ? 1 : kDim); ++y) {
-                    unsigned bits = tile;
-                    if (home) bits = inside(home->buffer().data() + (x * kDim + y) * kDim, k ? 1 : kDim);
-                    row[x + kDim * i][y + kDim * j] |= (k ? bits & 1u : bits) << (kDim * k);
+                    const auto bits = static_cast<unsigned>(layers[x] >> kDim * y);
+                    row[x + kDim * i][y + kDim * j] |= (bits & (k ? 1u : 0xffu)) << kDim * k;
                 }
         }
+    }
+
+    /// Whether some are inside and some are not.
+    bool are_mixed() const {
+        unsigned any = 0, all = ~0u;
+        for (const auto& rows : row)
+            for (const unsigned bits : rows) any |= bits, all &= bits;
+        return any != 0 && all != (1u << (kDim + 1)) - 1u;
     }
 
     /// Bit 8 u + w of layer `at` (0 to 8) across an axis; u, w along the others in their order.
@@ -54,13 +120,6 @@ struct LeafSides {
         const auto pair = [&](unsigned bits) { return bits >> z & 3u; };
         return pair(row[x][y]) | pair(row[x][y + 1]) << 2 | pair(row[x + 1][y]) << 4 |
                pair(row[x + 1][y + 1]) << 6;
-    }
-
-private:
-    static unsigned inside(const float* values, int count) {
-        unsigned result = 0;
-        for (int i = 0; i < count; ++i) result |= static_cast<unsigned>(values[i] < 0.0f) << i;
-        return result;
     }
 };
 

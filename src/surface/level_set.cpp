@@ -3,6 +3,7 @@
 #include <openvdb/tools/Count.h>
 #include <openvdb/tools/ValueTransformer.h>
 #include <openvdb/tools/VolumeToMesh.h>
+#include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
@@ -16,6 +17,7 @@
 #include "isotrack/error.h"
 #include "surface/affine_map.h"
 #include "surface/ambiguous_faces.h"
+#include "surface/chosen_edges.h"
 #include "surface/crossed_components.h"
 #include "surface/crossed_edges.h"
 #include "surface/grid_probe.h"
@@ -39,7 +41,7 @@ struct Slope {
 };
 
 Slope slope_at_surface(const FloatTree& tree, const AffineMap& map,
-                       const std::vector<CrossedEdge>& crossings) {
+                       const UnsetVector<CrossedEdge>& crossings) {
     constexpr std::size_t kSamples = 4000;
     Stencil stencil(tree);
     std::vector<double> slopes;
@@ -66,19 +68,27 @@ Slope slope_at_surface(const FloatTree& tree, const AffineMap& map,
 double depth_inside(const FloatTree& tree) {
     using Leaf = FloatTree::LeafNodeType;
     constexpr openvdb::Index kLast = Leaf::DIM - 1;
-    double result = std::numeric_limits<double>::infinity();
-    const auto take = [&](float value) {
-        if (value < 0.0f) result = std::min(result, -static_cast<double>(value));
-    };
-    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
-        for (openvdb::Index corner = 0; corner < 8; ++corner) {  // one of them is where any is, nearly always
-            const openvdb::Index n = ((corner >> 2) * kLast << 2 * Leaf::LOG2DIM) |
-                                     ((corner >> 1 & 1) * kLast << Leaf::LOG2DIM) | (corner & 1) * kLast;
-            if (!leaf->isValueOn(n)) take(leaf->getValue(n));
-        }
+    constexpr double kNone = std::numeric_limits<double>::infinity();
+    const auto depth = [](float value) { return value < 0.0f ? -static_cast<double>(value) : kNone; };
+    const auto least = [](double a, double b) { return std::min(a, b); };
+    const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
+    double result = tbb::parallel_reduce(
+        leaves.leafRange(), kNone,
+        [&](const auto& range, double so_far) {
+            for (auto leaf = range.begin(); leaf; ++leaf)
+                for (openvdb::Index corner = 0; corner < 8;
+                     ++corner) {  // one of them is where any is, nearly always
+                    const openvdb::Index n = ((corner >> 2) * kLast << 2 * Leaf::LOG2DIM) |
+                                             ((corner >> 1 & 1) * kLast << Leaf::LOG2DIM) |
+                                             (corner & 1) * kLast;
+                    if (!leaf->isValueOn(n)) so_far = least(so_far, depth(leaf->getValue(n)));
+                }
+            return so_far;
+        },
+        least);
     auto tile = tree.cbeginValueOff();
     tile.setMaxDepth(FloatTree::ValueOffCIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) take(*tile);
+    for (; tile; ++tile) result = least(result, depth(*tile));
     return result;
 }
 
@@ -132,8 +142,7 @@ struct LevelSet::Impl {
         refuse_beyond_band(options.iso, found, in_grid_units.median * map.voxel_size);
         scale = value_scale_for(in_grid_units.median, map.voxel_size, grid_class == openvdb::GRID_LEVEL_SET);
         if (in_grid_units.mean > 0.0) slope = std::min(1.0, scale * in_grid_units.mean);
-        border_crossings = static_cast<std::size_t>(
-            std::count_if(found.edges.begin(), found.edges.end(), [](const auto& c) { return c.at_border; }));
+        border_crossings = found.at_border;
 
         if (!own && scale != 1.0) grid = own = floats->deepCopy();
         if (own) {
@@ -289,7 +298,7 @@ private:
 Surface::CrossingSequence LevelSet::crossing_sequence(double apart) const {
     constexpr double kFlat = 4.01;  // of `apart`: cubes where the surface may be flat
     constexpr int kWidest = 64;     // voxels
-    const std::vector<CrossedEdge>& edges = impl_->crossed.edges;
+    const UnsetVector<CrossedEdge>& edges = impl_->crossed.edges;
     const ToCrossing crossing(impl_->map);
     if (const int cube = cube_within(apart, resolution()); cube > 1) {
         std::vector<StandIn> some =
@@ -319,7 +328,7 @@ namespace {
 
 /// What `add(edge, found)` finds at the edges, in their order. `make_add()`: one for each block of them.
 template <typename Found, typename MakeAdd>
-std::vector<Found> gather(const std::vector<CrossedEdge>& edges, const MakeAdd& make_add) {
+std::vector<Found> gather(const UnsetVector<CrossedEdge>& edges, const MakeAdd& make_add) {
     constexpr std::size_t kBlock = 16384;
     return find_in_blocks<Found>(edges.size(), kBlock,
                                  [&](std::size_t begin, std::size_t end, std::vector<Found>& found) {
