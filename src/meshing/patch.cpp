@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <tuple>
+#include <unordered_map>
 #include <utility>
 
 #include "disjoint_sets.h"
@@ -33,15 +35,42 @@ double squared_distance_to_edge(const Vec3& p, const Vec3& a, const Vec3& b) {
     return (ap - t * ab).squaredNorm();
 }
 
+/// The edges of triangles, ascending by their ends, the lower first, those that run upwards first of equals.
+class SortedEdges {
+public:
+    explicit SortedEdges(const std::vector<Triangle>& triangles) {
+        edges_.reserve(3 * triangles.size());
+        for (const Triangle& t : triangles)
+            for (int k = 0; k < 3; ++k) {
+                const auto from = static_cast<std::uint64_t>(t[k]),
+                           to = static_cast<std::uint64_t>(t[(k + 1) % 3]);
+                edges_.push_back(from < to ? from << 32 | to << 1 : to << 32 | from << 1 | 1);
+            }
+        std::sort(edges_.begin(), edges_.end());
+    }
+    /// Calls `visit(low, high, upwards, downwards)` for each: how many triangles have it, by how it runs.
+    template <typename Visit>
+    void for_each(const Visit& visit) const {
+        for (auto e = edges_.begin(); e != edges_.end();) {
+            const std::uint64_t ends = *e >> 1;
+            int runs[2] = {0, 0};
+            for (; e != edges_.end() && *e >> 1 == ends; ++e) ++runs[*e & 1];
+            visit(static_cast<int>(ends >> 31), static_cast<int>(ends & 0x7fffffff), runs[0], runs[1]);
+        }
+    }
+
+private:
+    std::vector<std::uint64_t> edges_;
+};
+
 /// The edges of triangles that have one of them alone, each as it runs there, ascending.
 std::vector<std::pair<int, int>> border_of(const std::vector<Triangle>& triangles) {
-    std::vector<std::pair<int, int>> edges, result;
-    for (const Triangle& t : triangles)
-        for (int k = 0; k < 3; ++k) edges.emplace_back(t[k], t[(k + 1) % 3]);
-    std::sort(edges.begin(), edges.end());
-    std::copy_if(edges.begin(), edges.end(), std::back_inserter(result), [&](const auto& e) {
-        return !std::binary_search(edges.begin(), edges.end(), std::pair(e.second, e.first));
+    std::vector<std::pair<int, int>> result;
+    SortedEdges(triangles).for_each([&](int low, int high, int upwards, int downwards) {
+        if (downwards == 0) result.insert(result.end(), upwards, {low, high});
+        if (upwards == 0) result.insert(result.end(), downwards, {high, low});
     });
+    std::sort(result.begin(), result.end());
     return result;
 }
 
@@ -62,29 +91,19 @@ struct Numbers {
     long components, euler;
 };
 
-/// Of triangles with all their edges and corners.
-Numbers numbers_of(const std::vector<Triangle>& triangles) {
-    std::vector<int> corners;
-    std::vector<std::pair<int, int>> edges;
+/// Of triangles with all their edges and corners, which are below `vertices`.
+Numbers numbers_of(const std::vector<Triangle>& triangles, std::size_t vertices) {
+    std::vector<char> is_corner(vertices, 0);
     for (const Triangle& t : triangles)
-        for (int k = 0; k < 3; ++k) {
-            corners.push_back(t[k]);
-            edges.emplace_back(std::minmax(t[k], t[(k + 1) % 3]));
-        }
-    const auto unify = [](auto& values) {
-        std::sort(values.begin(), values.end());
-        values.erase(std::unique(values.begin(), values.end()), values.end());
-    };
-    unify(corners);
-    unify(edges);
-    const auto number = [&](int v) {
-        return static_cast<int>(std::lower_bound(corners.begin(), corners.end(), v) - corners.begin());
-    };
-    DisjointSets sets(corners.size());
-    auto components = static_cast<long>(corners.size());
-    for (const auto& [from, to] : edges) components -= sets.join(number(from), number(to));
-    return {components, static_cast<long>(corners.size()) - static_cast<long>(edges.size()) +
-                            static_cast<long>(triangles.size())};
+        for (const int v : t) is_corner[v] = 1;
+    const auto corners = static_cast<long>(std::count(is_corner.begin(), is_corner.end(), 1));
+    DisjointSets sets(vertices);
+    long components = corners, edges = 0;
+    SortedEdges(triangles).for_each([&](int low, int high, int, int) {
+        components -= sets.join(low, high);
+        ++edges;
+    });
+    return {components, corners - edges + static_cast<long>(triangles.size())};
 }
 
 /// Of a border that is pinched nowhere.
@@ -172,7 +191,7 @@ struct Part {
 
 Part part_within(const Box& bounds, const TriangleBins& mesh) {
     Part result;
-    std::map<int, int> number;
+    std::unordered_map<int, int> number;
     for (const int t : mesh.meeting(bounds)) {
         if (!bounds.contains(mesh.box_of(t))) continue;
         result.triangles.push_back(mesh.triangles()[t]);
@@ -251,9 +270,12 @@ void leave_out(std::vector<Triangle>& triangles, const IsOut& is_out) {
 std::optional<std::vector<Triangle>> join(const std::vector<Loop>& outer, std::vector<Triangle>& coming,
                                           const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
                                           double farthest) {
-    for (auto bad = pinched(border_of(coming)); !bad.empty(); bad = pinched(border_of(coming)))
+    auto border = border_of(coming);
+    for (auto bad = pinched(border); !bad.empty(); bad = pinched(border)) {
         leave_out(coming, [&](const Triangle& t) { return has_any(t, bad); });
-    const std::vector<Loop> inner = loops_of(border_of(coming));
+        border = border_of(coming);
+    }
+    const std::vector<Loop> inner = loops_of(border);
     const std::vector<int> match = matches(outer, inner, points, farthest);
     if (match.size() != outer.size()) return std::nullopt;
     DisjointSets pieces(normals.size());
@@ -396,13 +418,13 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
         if (std::find(stays.begin(), stays.end(), 0) == stays.end()) break;
         compact(coming, stays);
     }
+    const Numbers now = numbers_of(all, at.size()), before = numbers_of(going, points.size());
+    patch.components = now.components - before.components;
+    patch.euler = now.euler - before.euler;
     for (Triangle& t : all)
         for (int& v : t)
             v = static_cast<std::size_t>(v) < own ? static_cast<int>(points.size()) + v : rim[v - own];
     patch.triangles = std::move(all);
-    const Numbers now = numbers_of(patch.triangles), before = numbers_of(going);
-    patch.components = now.components - before.components;
-    patch.euler = now.euler - before.euler;
     return patch;
 }
 
