@@ -550,6 +550,8 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
 /// Gives the mesh the ids and velocities of its particles.
 void Tracker::Impl::name_vertices(const FrameMesh& mesh, TriangleMesh& named) {
     std::vector<char> seen(particles.size(), 0);
+    named.ids.reserve(mesh.carved.particle.size());
+    named.velocities.reserve(mesh.carved.particle.size());
     for (const int p : mesh.carved.particle) {
         const bool own = p >= 0 && !seen[p];
         if (own) seen[p] = 1;
@@ -568,11 +570,12 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     const Id first_new = next_id;
 
     place_particles(motion, *work);
-    Making making(*this, *work);
-    making.mesh_particles();
-    making.certify();
-    making.patch();
-
+    {
+        Making making(*this, *work);
+        making.mesh_particles();
+        making.certify();
+        making.patch();
+    }
     frame.relocated += dt->profile().relocated - relocated;
     inherit_velocities(particle_triangles(work->mesh.carved), first_new);
     name_vertices(work->mesh, frame.mesh);
