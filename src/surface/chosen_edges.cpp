@@ -31,7 +31,10 @@ constexpr std::size_t kNone = ~std::size_t{0};
 
 /// The edges of a cube, where the surface may be a flat sheet.
 struct FlatCube {
-    int count[6] = {};  // of edges in each direction
+    int count[6] = {};           // of edges in each direction
+    bool goes_one_way = false;   // along each axis
+    Vec3 normal = Vec3::Zero();  // the sum of the directions
+    int axis = 0;                // that it is nearest to
     // Of them all the lowest and the highest, as the surface faces there, and its corners: the farthest along
     // the diagonals of the two axes that it is nearest to.
     double low = kFar, high = -kFar;
@@ -42,20 +45,18 @@ struct FlatCube {
     static constexpr double kFar = std::numeric_limits<double>::infinity();
     static int direction(const CrossedEdge& edge) { return 2 * edge.axis + edge.outward; }
     int size() const { return std::accumulate(count, count + 6, 0); }
-    /// The sum of the directions: the normal of the surface.
-    Vec3 way() const { return Vec3(count[1] - count[0], count[3] - count[2], count[5] - count[4]); }
-    bool goes_one_way() const {
-        return (count[0] == 0 || count[1] == 0) && (count[2] == 0 || count[3] == 0) &&
-               (count[4] == 0 || count[5] == 0);
-    }
     /// All edges are counted by now.
+    void take_counts() {
+        goes_one_way = (count[0] == 0 || count[1] == 0) && (count[2] == 0 || count[3] == 0) &&
+                       (count[4] == 0 || count[5] == 0);
+        normal = Vec3(count[1] - count[0], count[3] - count[2], count[5] - count[4]);
+        normal.cwiseAbs().maxCoeff(&axis);
+    }
     void take_place(std::size_t number, const CrossedEdge& edge) {
-        const Vec3 p = edge.index(), n = way();
-        const double height = n.dot(p);
+        const Vec3 p = edge.index();
+        const double height = normal.dot(p);
         low = std::min(low, height);
         high = std::max(high, height);
-        int axis = 0;
-        n.cwiseAbs().maxCoeff(&axis);
         const double u = p[(axis + 1) % 3], v = p[(axis + 2) % 3];
         const double along[4] = {u + v, u - v, -u - v, v - u};
         for (int k = 0; k < 4; ++k) {
@@ -67,7 +68,7 @@ struct FlatCube {
     /// It is flat if it goes one way between two planes that are close together, and is no part of a drop.
     void judge(int wide) {
         constexpr double kThickness = 0.16, kLeastSpread = 0.5;  // of the cube's edge
-        flat = goes_one_way() && high - low <= kThickness * wide * way().norm() &&
+        flat = goes_one_way && high - low <= kThickness * wide * normal.norm() &&
                std::max(corner[0] + corner[2], corner[1] + corner[3]) >= kLeastSpread * wide;
     }
     void choose(std::vector<StandIn>& found) const {
@@ -149,9 +150,10 @@ std::vector<StandIn> thin_out(const CrossedEdges& crossed, int cube, int wide) {
                     ++around.count[FlatCube::direction(crossed.edges[e])];
                 });
             });
+            for (FlatCube& c : wide_cubes) c.take_counts();
             parts.for_each_in(n, [&](std::size_t part) {
                 for_each_edge(crossed.parts[part], [&](std::size_t e, const Coord&, FlatCube& around) {
-                    if (around.goes_one_way()) around.take_place(e, crossed.edges[e]);
+                    if (around.goes_one_way) around.take_place(e, crossed.edges[e]);
                 });
             });
             for (FlatCube& c : wide_cubes) c.judge(wide);

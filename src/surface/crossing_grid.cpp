@@ -1,54 +1,50 @@
 #include "isotrack/surface/crossing_grid.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 #include <atomic>
 #include <cmath>
+#include <mutex>
 #include <tuple>
+#include <utility>
 
 namespace isotrack {
 
 namespace {
 
-/// Of crossings: the box around them and their different directions.
-struct Extent {
-    Box box;
-    std::vector<Eigen::Vector3f> directions{};
-
-    void add(const Eigen::Vector3f& direction) {
-        if (std::find(directions.begin(), directions.end(), direction) == directions.end())
-            directions.push_back(direction);
+/// Different directions, numbered as they are met by several threads.
+class Directions {
+public:
+    std::uint32_t number_of(const Eigen::Vector3f& direction) {
+        const std::lock_guard lock(mutex_);
+        const auto number =
+            static_cast<std::uint32_t>(std::find(all_.begin(), all_.end(), direction) - all_.begin());
+        if (number == all_.size()) all_.push_back(direction);
+        return number;
     }
+    const std::vector<Eigen::Vector3f>& all() const { return all_; }
+
+private:
+    std::mutex mutex_;
+    std::vector<Eigen::Vector3f> all_;
 };
+
+Box box_around(const std::vector<Surface::Crossing>& crossings) {
+    Box box;
+    for (const Surface::Crossing& crossing : crossings) box.extend(crossing.point);
+    return box;
+}
 
 }  // namespace
 
-CrossingGrid::CrossingGrid(double spacing, const Surface::CrossingSequence& crossings)
+CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing)
+    : CrossingGrid(spacing, box_around(crossings),
+                   {crossings.size(), [&](std::size_t i) { return crossings[i]; }}) {}
+
+CrossingGrid::CrossingGrid(double spacing, const Box& box, const Surface::CrossingSequence& crossings)
     : spacing_(spacing), width_(2.0 * spacing) {
     constexpr double kColumnsPerCrossing = 4.0;
     if (crossings.size == 0) return;
-    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, 4096);
-    const Extent extent = tbb::parallel_reduce(
-        range_of_all, Extent(),
-        [&](const auto& range, Extent sum) {
-            for (std::size_t c = range.begin(); c < range.end(); ++c) {
-                const Surface::Crossing crossing = crossings.at(c);
-                sum.box.extend(crossing.point);
-                sum.add(crossing.outward);
-            }
-            return sum;
-        },
-        [](Extent a, const Extent& b) {
-            a.box.extend(b.box);
-            for (const Eigen::Vector3f& direction : b.directions) a.add(direction);
-            return a;
-        });
-    const Box& box = extent.box;
-    directions_ = extent.directions;
-    std::sort(directions_.begin(), directions_.end(), [](const auto& a, const auto& b) {
-        return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
-    });
     origin_ = box.min();
     const double most = kColumnsPerCrossing * static_cast<double>(crossings.size);
     const Vec3 size = box.sizes();
@@ -57,29 +53,44 @@ CrossingGrid::CrossingGrid(double spacing, const Surface::CrossingSequence& cros
 
     const std::size_t columns = static_cast<std::size_t>(count_[0]) * count_[1];
     first_.assign(columns + 1, 0);
-    const auto offset_of = [&](const Surface::Crossing& c) -> Eigen::Vector3f {
-        return (c.point - origin_).cast<float>();
-    };
     // Each goes to the next free place of its column, in any order: they are sorted then.
+    std::vector<Entry> made(crossings.size);
     std::vector<std::atomic<std::uint32_t>> next(columns);
+    Directions directions;
+    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, 4096);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
-        for (std::size_t c = range.begin(); c < range.end(); ++c)
-            next[column_of(offset_of(crossings.at(c)))].fetch_add(1, std::memory_order_relaxed);
+        std::vector<std::pair<Eigen::Vector3f, std::uint32_t>> known;
+        for (std::size_t c = range.begin(); c < range.end(); ++c) {
+            const Surface::Crossing crossing = crossings.at(c);
+            auto direction = std::find_if(known.begin(), known.end(),
+                                          [&](const auto& k) { return k.first == crossing.outward; });
+            if (direction == known.end())
+                direction =
+                    known.insert(known.end(), {crossing.outward, directions.number_of(crossing.outward)});
+            made[c] = {(crossing.point - origin_).cast<float>(), direction->second,
+                       static_cast<std::uint32_t>(crossing.stands_for), crossing.flat};
+            next[column_of(made[c].offset)].fetch_add(1, std::memory_order_relaxed);
+        }
     });
     for (std::size_t c = 0; c < columns; ++c) {
         first_[c + 1] = first_[c] + next[c].load(std::memory_order_relaxed);
         next[c].store(0, std::memory_order_relaxed);
     }
+    directions_ = directions.all();
+    std::sort(directions_.begin(), directions_.end(), [](const auto& a, const auto& b) {
+        return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+    });
+    std::vector<std::uint32_t> sorted;  // their numbers then
+    for (const Eigen::Vector3f& direction : directions.all())
+        sorted.push_back(static_cast<std::uint32_t>(
+            std::find(directions_.begin(), directions_.end(), direction) - directions_.begin()));
     entries_.resize(crossings.size);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
-            const Surface::Crossing crossing = crossings.at(c);
-            const Eigen::Vector3f offset = offset_of(crossing);
-            const std::size_t column = column_of(offset);
-            const auto direction = std::find(directions_.begin(), directions_.end(), crossing.outward);
-            entries_[first_[column] + next[column].fetch_add(1, std::memory_order_relaxed)] = {
-                offset, static_cast<std::uint32_t>(direction - directions_.begin()),
-                static_cast<std::uint32_t>(crossing.stands_for), crossing.flat};
+            const std::size_t column = column_of(made[c].offset);
+            Entry& entry = entries_[first_[column] + next[column].fetch_add(1, std::memory_order_relaxed)];
+            entry = made[c];
+            entry.direction = sorted[entry.direction];
         }
     });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns, 256), [&](const auto& range) {

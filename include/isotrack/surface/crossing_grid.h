@@ -16,10 +16,10 @@ class CrossingGrid {
 public:
     /// Those of `surface.crossing_sequence(apart)`.
     explicit CrossingGrid(const Surface& surface, double apart = 0.0)
-        : CrossingGrid(std::max(surface.resolution(), apart), surface.crossing_sequence(apart)) {}
+        : CrossingGrid(std::max(surface.resolution(), apart), surface.bounds(),
+                       surface.crossing_sequence(apart)) {}
     /// `spacing` of the crossings, world units. Few different directions, as those of a lattice.
-    CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing)
-        : CrossingGrid(spacing, {crossings.size(), [&](std::size_t i) { return crossings[i]; }}) {}
+    CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing);
 
     std::size_t size() const { return entries_.size(); }
     bool empty() const { return entries_.empty(); }
@@ -70,7 +70,8 @@ public:
     std::vector<char> columns_of(const std::vector<int>& some) const;
 
 private:
-    CrossingGrid(double spacing, const Surface::CrossingSequence& crossings);
+    /// `box`: around them.
+    CrossingGrid(double spacing, const Box& box, const Surface::CrossingSequence& crossings);
 
     /// A crossing in 16 bytes: there are more of them than of all else.
     struct Entry {
