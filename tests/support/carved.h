@@ -1,0 +1,88 @@
+// Meshes of a surface made simply, whose labels can be spoilt.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "isotrack/sampling/cover.h"
+#include "isotrack/surface/crossing_grid.h"
+#include "tracking/inspection.h"
+#include "tracking/mesh_trials.h"
+#include "tracking/relabelling.h"
+#include "tracking/specks.h"
+
+namespace isotrack::support {
+
+constexpr double kResolution = 0.05, kEdge = 0.2;
+
+/// Seeds on a surface, their DT, and the mesh carved from it.
+struct Carved {
+    const Surface& surface;
+    SizingLimits limits{};
+    Particles particles;
+    Tetrahedra cells;
+    CellLabels labels;
+
+    Carved(const Surface& of, double tolerance, double edge = kEdge) : surface(of) {
+        limits.tolerance = 0.1 * edge;  // for the seeds
+        limits.angle = 0.7;
+        limits.min_edge = limits.max_edge = edge;
+        limits.detail = surface.resolution();
+        Id next_id = 0;
+        cover(particles, surface, CrossingGrid(surface), limits, 1, next_id);
+        limits.tolerance = tolerance;
+        cells = tetrahedralise(particles.position);
+        labels = guided_convection(cells, particles.position, particles.normal, surface);
+    }
+    FrameMesh mesh() const {
+        FrameMesh result;
+        result.carved = carve(cells, labels, particles.position);
+        std::size_t midpoint = 0;
+        for (const int p : result.carved.particle)
+            result.vertices.push_back(p >= 0 ? particles.position[p] : result.carved.midpoints[midpoint++]);
+        result.on_surface = result.vertices;
+        return result;
+    }
+    Carve carve_labels() {
+        return [this](CellLabels& of_cells) {
+            labels = of_cells;
+            return mesh();
+        };
+    }
+    Inspection inspect(const FrameMesh& mesh) const {
+        Inspection result;
+        result.errors = std::make_shared<const std::vector<TriangleError>>(
+            triangle_errors(mesh.vertices, mesh.carved.triangles, surface, 6));
+        return result;
+    }
+    Vec3 centroid(int cell) const {
+        Vec3 sum = Vec3::Zero();
+        for (const int v : cells.vertices[cell]) sum += particles.position[v];
+        return sum / 4.0;
+    }
+    std::size_t relabel() {
+        const FrameMesh now = mesh();
+        return isotrack::relabel(labels, cells, now, inspect(now), particles, surface, limits);
+    }
+};
+
+/// A mesh, its inspection with all that there is to look at, and trials of others.
+struct Inspected {
+    CrossingGrid crossings;
+    Inspector inspector;
+    Inspection inspection;
+    MeshTrials trials;
+
+    Inspected(const Carved& carved, FrameMesh& mesh) : Inspected(carved.surface, carved.limits, mesh) {}
+    Inspected(const Surface& surface, const SizingLimits& limits, FrameMesh& mesh)
+        : crossings(surface),
+          inspector(surface, limits, crossings),
+          inspection(inspector.inspect_both_ways(mesh)),
+          trials(mesh, inspection, inspector, limits) {
+        inspector.look_between(mesh, inspection);
+        inspector.inspect_topology(mesh, inspection);
+    }
+};
+
+}  // namespace isotrack::support
