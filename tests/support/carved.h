@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "isotrack/sampling/cover.h"
-#include "isotrack/surface/crossing_grid.h"
+#include "isotrack/meshing/convection.h"
+#include "support/samples.h"
 #include "tracking/inspection.h"
 #include "tracking/mesh_trials.h"
 #include "tracking/relabelling.h"
@@ -17,22 +17,13 @@ namespace isotrack::support {
 constexpr double kResolution = 0.05, kEdge = 0.2;
 
 /// Seeds on a surface, their DT, and the mesh carved from it.
-struct Carved {
+struct Carved : Samples {
     const Surface& surface;
-    SizingLimits limits{};
-    Particles particles;
-    Tetrahedra cells;
     CellLabels labels;
 
-    Carved(const Surface& of, double tolerance, double edge = kEdge) : surface(of) {
-        limits.tolerance = 0.1 * edge;  // for the seeds
-        limits.angle = 0.7;
-        limits.min_edge = limits.max_edge = edge;
-        limits.detail = surface.resolution();
-        Id next_id = 0;
-        cover(particles, surface, CrossingGrid(surface), limits, 1, next_id);
+    Carved(const Surface& of, double tolerance, double edge = kEdge) : Samples(of, edge), surface(of) {
         limits.tolerance = tolerance;
-        cells = tetrahedralise(particles.position);
+        limits.detail = surface.resolution();
         labels = guided_convection(cells, particles.position, particles.normal, surface);
     }
     FrameMesh mesh() const {
