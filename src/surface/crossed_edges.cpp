@@ -150,12 +150,14 @@ std::size_t write_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader&
 CrossedEdges find_crossed_edges(const FloatTree& tree) {
     const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
     const std::size_t count = leaves.leafCount();
+    std::atomic<bool> finite{true};
     const auto for_each_leaf = [&](const auto& visit) {
         constexpr std::size_t kLeavesPerBlock = 512;
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kLeavesPerBlock), [&](const auto& range) {
             TreeReader reader(tree);
             LeafSigns signs;
             for (std::size_t n = range.begin(); n < range.end(); ++n) visit(n, leaves.leaf(n), reader, signs);
+            if (!signs.are_finite()) finite = false;
         });
     };
     // Counted first, so that each has its place in memory that is touched once.
@@ -166,6 +168,7 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
         first[n + 1] = count_edges_of(leaf, sides, reader);
         parts[n] = cell_parts(leaf, sides, reader);
     });
+    if (!finite) return {false, {}, {}, 0, 0};
     std::partial_sum(first.begin(), first.end(), first.begin());
     CrossedEdges result;
     result.edges.resize(first.back());

@@ -36,14 +36,15 @@ struct CrossedEdges {
         openvdb::Coord origin;  ///< Of the leaf.
         std::size_t begin, end;
     };
+    bool finite = true;  ///< Whether all values of leaves are.
     UnsetVector<CrossedEdge> edges;
     std::vector<Part> parts;    ///< One after the other, in the order of the tree.
     long cell_parts = 0;        ///< Of all leaves: see cell_parts.h.
     std::size_t at_border = 0;  ///< So many of the edges are.
 };
 
-/// Every edge with a sign change; values must be finite. Edges between two tiles are not seen: a level set
-/// has voxels at its surface.
+/// Every edge with a sign change; nothing where a value of a leaf is not finite. Edges between two tiles are
+/// not seen: a level set has voxels at its surface.
 CrossedEdges find_crossed_edges(const openvdb::FloatTree& tree);
 
 }  // namespace isotrack

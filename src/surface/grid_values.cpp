@@ -4,7 +4,6 @@
 #include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -17,17 +16,7 @@ using Leaf = FloatTree::LeafNodeType;
 
 bool is_plain(const FloatGrid& grid) {
     const float background = grid.background();
-    if (!(background > 0.0f) || !std::isfinite(background) || grid.tree().activeTileCount() > 0) return false;
-    openvdb::tree::LeafManager<const FloatTree> leaves(grid.constTree());
-    std::atomic<bool> finite{true};
-    leaves.foreach ([&](const Leaf& leaf, std::size_t) {
-        const float* data = leaf.buffer().data();
-        // Stays finite unless a value is not; leaves hold too few values to overflow otherwise.
-        float sum = 0.0f;
-        for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) sum += data[i] * 0.0f;
-        if (!(sum == 0.0f)) finite = false;
-    });
-    return finite;
+    return background > 0.0f && std::isfinite(background) && grid.tree().activeTileCount() == 0;
 }
 
 template <typename GridType>

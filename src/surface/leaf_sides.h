@@ -6,6 +6,7 @@
 #include <xmmintrin.h>
 #endif
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -17,7 +18,7 @@ namespace isotrack {
 using TreeReader = openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>;
 
 /// Which nodes of leaves are inside, remembered of those asked for last: their values are read once, though
-/// the leaves around them ask as well. For one thread.
+/// the leaves around them ask as well. For one thread. Notices values that are not finite.
 class LeafSigns {
 public:
     using Leaf = openvdb::FloatTree::LeafNodeType;
@@ -34,14 +35,20 @@ public:
         if (place.leaf != &leaf) {
             place.leaf = &leaf;
             const float* values = leaf.buffer().data();
+            std::array<float, kDim> zero{};  // stays so unless a value is not finite
             for (std::uint64_t& layer : place.layers) {
                 layer = 0;
-                for (int y = 0; y < kDim; ++y, values += kDim)
+                for (int y = 0; y < kDim; ++y, values += kDim) {
                     layer |= static_cast<std::uint64_t>(negative(values)) << kDim * y;
+                    for (int z = 0; z < kDim; ++z) zero[z] += values[z] * 0.0f;
+                }
             }
+            finite_ = finite_ && std::all_of(zero.begin(), zero.end(), [](float sum) { return sum == 0.0f; });
         }
         return place.layers;
     }
+    /// Whether all values read so far are.
+    bool are_finite() const { return finite_; }
 
 private:
     static constexpr int kShift = 64 - 11;
@@ -67,6 +74,7 @@ private:
     }
 
     std::vector<Place> places_;
+    bool finite_ = true;
 };
 
 /// Of a leaf's nodes and those one beyond its upper ends.

@@ -125,14 +125,14 @@ struct LevelSet::Impl {
         const double sign = fog ? -1.0 : 1.0;
         const bool plain = floats && options.iso == 0.0 && !fog && is_plain(*floats);
         FloatGrid::Ptr own;
-        if (!plain) {
+        CrossedEdges found;
+        if (plain) found = find_crossed_edges(floats->constTree());
+        if (!plain || !found.finite) {
             own = floats ? float_copy(*floats, options.iso, sign) : float_copy(*doubles, options.iso, sign);
-            grid = own;
-        } else {
-            grid = floats;
+            found = find_crossed_edges(own->constTree());
         }
+        grid = own ? FloatGrid::ConstPtr(own) : floats;
 
-        CrossedEdges found = find_crossed_edges(grid->constTree());
         if (found.edges.empty() && active_voxels > 0 && grid_class != openvdb::GRID_LEVEL_SET)
             throw InputError(
                 grid_label(*source) + " is not a level set: its values do not change sign around " +
