@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
+#include <cstdint>
 
 #include "disjoint_sets.h"
 #include "surface/ambiguous_faces.h"
@@ -64,17 +66,48 @@ int parts_at(const Coord& cell, unsigned mask, TreeReader& reader) {
 
 /// Of the cells that have their least node in the leaf.
 long parts_in(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
+    using Bits = std::uint64_t;
     long result = 0;
-    for (int x = 0; x < kDim; ++x)
-        for (int y = 0; y < kDim; ++y) {
-            const unsigned a = sides.row[x][y], b = sides.row[x][y + 1], c = sides.row[x + 1][y],
-                           d = sides.row[x + 1][y + 1], any = a | b | c | d, all = a & b & c & d;
-            for (unsigned mixed = (any | any >> 1) & ~(all & all >> 1) & 0xffu; mixed != 0;
-                 mixed &= mixed - 1) {
-                const int z = __builtin_ctz(mixed);
-                result += parts_at(leaf.origin().offsetBy(x, y, z), sides.of_cell(x, y, z), reader);
-            }
+    for (int x = 0; x < kDim; ++x) {
+        Bits inside[2][2][2], any = 0, all = ~Bits{0};  // of all cells with this x: at each corner
+        for (int n = 0; n < 8; ++n) {
+            const Bits bits = inside[n >> 2][n >> 1 & 1][n & 1] = sides.word(x + (n >> 2), n >> 1 & 1, n & 1);
+            any |= bits;
+            all &= bits;
         }
+        const Bits mixed = any & ~all;
+        if (mixed == 0) continue;
+        // Those with an ambiguous face or only two opposite corners on a side may have several.
+        Bits several = 0;
+        const auto add_face = [&](Bits a, Bits b, Bits c, Bits d) {
+            several |= ~(a ^ c) & ~(b ^ d) & (a ^ b);
+        };
+        for (const int side : {0, 1}) {
+            const auto& across_x = inside[side];
+            add_face(across_x[0][0], across_x[1][0], across_x[1][1], across_x[0][1]);
+            add_face(inside[0][side][0], inside[1][side][0], inside[1][side][1], inside[0][side][1]);
+            add_face(inside[0][0][side], inside[1][0][side], inside[1][1][side], inside[0][1][side]);
+        }
+        for (int n = 0; n < 4; ++n) {
+            Bits any_other = 0, all_others = ~Bits{0}, any_of_two = 0, both = ~Bits{0};
+            for (int m = 0; m < 8; ++m) {
+                const Bits bits = inside[m >> 2][m >> 1 & 1][m & 1];
+                const bool of_two = m == n || m == 7 - n;
+                (of_two ? any_of_two : any_other) |= bits;
+                (of_two ? both : all_others) &= bits;
+            }
+            several |= (both & ~any_other) | (all_others & ~any_of_two);
+        }
+        several &= mixed;
+        result += static_cast<long>(std::bitset<64>(mixed & ~several).count());
+        for (; several != 0; several &= several - 1) {
+            const int at = __builtin_ctzll(several);
+            unsigned mask = 0;
+            for (int n = 0; n < 8; ++n)
+                mask |= static_cast<unsigned>(inside[n >> 2][n >> 1 & 1][n & 1] >> at & 1u) << n;
+            result += parts_at(leaf.origin().offsetBy(x, at / kDim, at % kDim), mask, reader);
+        }
+    }
     return result;
 }
 
@@ -91,7 +124,7 @@ long parts_below(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
         bool all_same = true;
         for (int x = 0; x <= (below[0] ? 0 : kDim); ++x)
             for (int y = 0; y <= (below[1] ? 0 : kDim); ++y)
-                all_same = all_same && (sides.row[x][y] & bits) == (tile ? bits : 0u);
+                all_same = all_same && (sides.row(x, y) & bits) == (tile ? bits : 0u);
         if (all_same) continue;
         const auto end = [&](int axis) { return below[axis] ? 0 : kDim; };
         const auto begin = [&](int axis) { return -below[axis]; };

@@ -78,57 +78,77 @@ private:
 };
 
 /// Of a leaf's nodes and those one beyond its upper ends.
-struct LeafSides {
+class LeafSides {
+public:
     using Leaf = LeafSigns::Leaf;
     static constexpr int kDim = LeafSigns::kDim;
 
-    /// Bit z of row (x, y).
-    std::array<std::array<unsigned, kDim + 1>, kDim + 1> row{};
-
     LeafSides(const Leaf& leaf, TreeReader& reader, LeafSigns& signs) {
-        for (int upper = 0; upper < 8; ++upper) {
-            const int i = upper >> 2, j = upper >> 1 & 1, k = upper & 1;
-            const openvdb::Coord at = leaf.origin().offsetBy(kDim * i, kDim * j, kDim * k);
-            const Leaf* home = upper == 0 ? &leaf : reader.probeConstLeaf(at);
-            LeafSigns::Layers tile;
-            if (!home) tile.fill(reader.getValue(at) < 0.0f ? ~std::uint64_t{0} : 0);
-            const LeafSigns::Layers& layers = home ? signs.of(*home) : tile;
-            for (int x = 0; x < (i ? 1 : kDim); ++x)
-                for (int y = 0; y < (j ? 1 : kDim); ++y) {
-                    const auto bits = static_cast<unsigned>(layers[x] >> kDim * y);
-                    row[x + kDim * i][y + kDim * j] |= (bits & (k ? 1u : 0xffu)) << kDim * k;
+        for (const int i : {0, 1}) {
+            // Of this leaf or the one beyond it along the first axis, and of those further along the others.
+            LeafSigns::Layers layers[2][2];
+            for (const int j : {0, 1})
+                for (const int k : {0, 1}) {
+                    const openvdb::Coord at = leaf.origin().offsetBy(kDim * i, kDim * j, kDim * k);
+                    const Leaf* home = i + j + k == 0 ? &leaf : reader.probeConstLeaf(at);
+                    if (home)
+                        layers[j][k] = signs.of(*home);
+                    else
+                        layers[j][k].fill(reader.getValue(at) < 0.0f ? ~std::uint64_t{0} : 0);
                 }
+            const auto next_y = [](std::uint64_t here, std::uint64_t beyond) {
+                return here >> kDim | beyond << (kDim - 1) * kDim;
+            };
+            const auto next_z = [](std::uint64_t here, std::uint64_t beyond) {
+                return (here >> 1 & ~(kFirstZ << (kDim - 1))) | (beyond & kFirstZ) << (kDim - 1);
+            };
+            for (int x = 0; x < (i ? 1 : kDim); ++x) {
+                auto& word = word_[x + kDim * i];
+                word[0][0] = layers[0][0][x];
+                word[0][1] = next_z(layers[0][0][x], layers[0][1][x]);
+                word[1][0] = next_y(layers[0][0][x], layers[1][0][x]);
+                word[1][1] = next_z(word[1][0], next_y(layers[0][1][x], layers[1][1][x]));
+            }
         }
     }
 
+    /// Bit 8 y + z: whether node (x, y + j, z + k) is inside; x from 0 to 8, j and k 0 or 1.
+    std::uint64_t word(int x, int j, int k) const { return word_[x][j][k]; }
+
     /// Whether some are inside and some are not.
     bool are_mixed() const {
-        unsigned any = 0, all = ~0u;
-        for (const auto& rows : row)
-            for (const unsigned bits : rows) any |= bits, all &= bits;
-        return any != 0 && all != (1u << (kDim + 1)) - 1u;
+        std::uint64_t any = 0, all = ~std::uint64_t{0};
+        for (const auto& words : word_)
+            for (const auto& pair : words)
+                for (const std::uint64_t bits : pair) any |= bits, all &= bits;
+        return any != 0 && all != ~std::uint64_t{0};
+    }
+
+    /// Bit z of row (x, y): all from 0 to 8.
+    unsigned row(int x, int y) const {
+        const int beyond = y == kDim, at = kDim * (y - beyond);
+        return static_cast<unsigned>((word_[x][beyond][0] >> at & 0xffu) |
+                                     (word_[x][beyond][1] >> (at + kDim - 1) & 1u) << kDim);
     }
 
     /// Bit 8 u + w of layer `at` (0 to 8) across an axis; u, w along the others in their order.
     std::uint64_t layer(int axis, int at) const {
+        if (axis == 0) return word_[at][0][0];
+        constexpr std::uint64_t kGather = 0x0102040810204080;  // bit 8 y to bit 56 + y
+        const int beyond = at == kDim, in = at - beyond;
         std::uint64_t result = 0;
-        for (int u = 0; u < kDim; ++u) {
-            std::uint64_t bits = 0;
-            if (axis == 2)
-                for (int w = 0; w < kDim; ++w) bits |= static_cast<std::uint64_t>(row[u][w] >> at & 1u) << w;
-            else
-                bits = (axis == 0 ? row[at][u] : row[u][at]) & 0xffu;
-            result |= bits << (kDim * u);
+        for (int x = 0; x < kDim; ++x) {
+            const std::uint64_t bits = axis == 1 ? word_[x][beyond][0] >> kDim * in & 0xffu
+                                                 : (word_[x][0][beyond] >> in & kFirstZ) * kGather >> 56;
+            result |= bits << kDim * x;
         }
         return result;
     }
 
-    /// The corners of the cell with this least node, bit 4 i + 2 j + k.
-    unsigned of_cell(int x, int y, int z) const {
-        const auto pair = [&](unsigned bits) { return bits >> z & 3u; };
-        return pair(row[x][y]) | pair(row[x][y + 1]) << 2 | pair(row[x + 1][y]) << 4 |
-               pair(row[x + 1][y + 1]) << 6;
-    }
+private:
+    static constexpr std::uint64_t kFirstZ = 0x0101010101010101;
+
+    std::uint64_t word_[kDim + 1][2][2];
 };
 
 }  // namespace isotrack
