@@ -19,10 +19,10 @@ namespace {
 
 constexpr double kLostAt = 3.0;  // tolerances
 constexpr double kMany = 0.3;    // of the triangles: when more change all distances are measured again
-constexpr double kAroundChanges = 2.01;                   // cutoffs: and some room for rounding
-constexpr double kFaultReach = 1.5;                       // resolutions
-constexpr double kMissedSpacing = 0.75, kMissedAt = 1.3;  // resolutions, tolerances: no particle is nearer
-constexpr double kDoubtSpacing = 0.4;                     // resolutions
+constexpr double kAroundChanges = 2.01;                    // cutoffs: and some room for rounding
+constexpr double kFaultReach = 1.5;                        // resolutions
+constexpr double kMissedSpacing = 0.75, kMissedAt = 1.3;   // resolutions, tolerances: no particle is nearer
+constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
 constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
 
 struct Corners {
@@ -197,13 +197,19 @@ void Inspector::take_missed(std::size_t d, Inspection& result) {
     result.lost_crossings += survey.lost;
     result.farthest_crossing = std::max(result.farthest_crossing, survey.farthest);
     const std::vector<int> before = std::exchange(missed_[d], survey.beyond);
+    std::vector<Vec3> in_vain;
     for (const int i : survey.beyond) {
         const Surface::Crossing place = distances_[d].points()[i];
         result.missed.push_back(place);
-        if (std::binary_search(before.begin(), before.end(), i)) result.doubts.around.push_back(place.point);
+        if (std::binary_search(before.begin(), before.end(), i)) in_vain.push_back(place.point);
     }
+    doubt(in_vain, kVainSpacing, result);
     if (d > 0) {  // they are not among the crossings around them
-        for (const int i : survey.beyond) result.doubts.at.push_back(distances_[d].points()[i].point);
+        std::vector<Shortage> at;
+        for (const int i : survey.beyond)
+            at.push_back({distances_[d].points()[i].point, kVainSpacing * surface_.resolution(),
+                          kLeastDoubtful * surface_.resolution()});
+        result.doubts.push_back({{}, 0.0, std::move(at)});
     } else if (survey.weight > 0.0) {
         result.crossings_mean_square = survey.sum_of_squares / survey.weight;
     }
@@ -212,13 +218,13 @@ void Inspector::take_missed(std::size_t d, Inspection& result) {
 Inspection Inspector::inspect(const FrameMesh& mesh) {
     Inspection result;
     forget_distances();
-    result.doubts.around = measure_errors(mesh, result);
+    doubt(measure_errors(mesh, result), kVainSpacing, result);
     return result;
 }
 
 Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     Inspection result;
-    result.doubts.around = measure_errors(mesh, result);
+    doubt(measure_errors(mesh, result), kVainSpacing, result);
     measured_ = true;
     if (!changes_.many)
         changes_.around = triangles_near_gone(changes_.went, kAroundChanges * cutoff(), mesh.vertices,
@@ -290,6 +296,10 @@ void Inspector::forget_distances() {
     for (std::vector<int>& missed : missed_) missed.clear();
 }
 
+void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const {
+    if (!places.empty()) inspection.doubts.push_back({places, spacing * surface_.resolution(), {}});
+}
+
 void Inspector::prepare_topology() {
     if (!sides_) sides_.emplace(surface_);
 }
@@ -297,17 +307,23 @@ void Inspector::prepare_topology() {
 void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {
     prepare_topology();
     inspection.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, *sides_);
-    const LatticeTopology& topology = inspection.topology;
-    Doubts& doubts = inspection.doubts;
-    doubts.around.insert(doubts.around.end(), topology.faults.begin(), topology.faults.end());
-    for (std::size_t t = 0; looks_ <= 1 && t < topology.speck.size(); ++t) {
-        const auto& [i, j, k] = mesh.carved.triangles[t];
-        if (topology.speck[t])
-            doubts.around.push_back((mesh.vertices[i] + mesh.vertices[j] + mesh.vertices[k]) / 3.0);
+    doubt(inspection.topology.faults, looks_ == 0 ? kFaultSpacing : kVainSpacing, inspection);
+    if (looks_ <= 1) {
+        std::vector<Vec3> places;
+        for (std::size_t t = 0; t < inspection.topology.speck.size(); ++t) {
+            const auto& [i, j, k] = mesh.carved.triangles[t];
+            if (inspection.topology.speck[t])
+                places.push_back((mesh.vertices[i] + mesh.vertices[j] + mesh.vertices[k]) / 3.0);
+        }
+        doubt(places, kVainSpacing, inspection);
     }
-    if (looks_ == 0)  // what is not mended then seldom is
-        for (const auto& diagonal : topology.parted)
-            doubts.at.insert(doubts.at.end(), diagonal.beside, diagonal.beside + 2);
+    if (looks_ == 0) {  // what is not mended then seldom is
+        std::vector<Shortage> at;
+        for (const auto& diagonal : inspection.topology.parted)
+            for (const Vec3& place : diagonal.beside)
+                at.push_back({place, kFaultSpacing * surface_.resolution()});
+        inspection.doubts.push_back({{}, 0.0, std::move(at)});
+    }
     ++looks_;
 }
 
@@ -347,10 +363,11 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     for (const auto& c : inspection.missed)
         result.push_back(
             {c.point, kMissedSpacing * std::max(surface.resolution(), kMissedAt * limits.tolerance)});
-    std::vector<Vec3> doubtful = crossings_around(inspection.doubts.around, surface);
-    doubtful.insert(doubtful.end(), inspection.doubts.at.begin(), inspection.doubts.at.end());
-    for (const Vec3& p : doubtful)
-        result.push_back({p, kDoubtSpacing * surface.resolution(), kLeastDoubtful * surface.resolution()});
+    for (const Doubt& doubt : inspection.doubts) {
+        for (const Vec3& p : crossings_around(doubt.places, surface))
+            result.push_back({p, doubt.spacing, kLeastDoubtful * surface.resolution()});
+        result.insert(result.end(), doubt.at.begin(), doubt.at.end());
+    }
     for (const auto& e : carved.complex_edges)
         result.push_back({0.5 * (particles.position[e.from] + particles.position[e.to]),
                           0.7 * std::min(particles.spacing[e.from], particles.spacing[e.to])});

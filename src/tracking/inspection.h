@@ -21,9 +21,10 @@
 namespace isotrack {
 
 /// Where particles may be missing.
-struct Doubts {
-    std::vector<Vec3> around;  ///< At the lattice crossings around these places,
-    std::vector<Vec3> at;      ///< and at these.
+struct Doubt {
+    std::vector<Vec3> places;  ///< At the lattice crossings around them;
+    double spacing = 0.0;      ///< as far from others, world units.
+    std::vector<Shortage> at;  ///< And there.
 };
 
 struct Inspection {
@@ -35,7 +36,7 @@ struct Inspection {
     double crossings_mean_square = 0.0;  ///< Of the crossings that were found.
     std::size_t lost_crossings = 0;      ///< Of these and those: not found.
     LatticeTopology topology;
-    Doubts doubts;  ///< Near its faults and near what was mended in vain, and all missed between.
+    std::vector<Doubt> doubts;  ///< Near its faults and near what was mended in vain, and all missed between.
 };
 
 /// The largest of `errors` (one per triangle) around each of so many particles; negative without a triangle.
@@ -96,6 +97,8 @@ private:
                          Inspection& inspection);
     void forget_distances();
     double cutoff() const;
+    /// `spacing` in resolutions.
+    void doubt(const std::vector<Vec3>& places, double spacing, Inspection& inspection) const;
 
     const Surface& surface_;
     const SizingLimits& limits_;
