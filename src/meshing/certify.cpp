@@ -134,9 +134,9 @@ namespace {
 
 /// `error_of(a, b, c, probe)` of each triangle abc.
 template <typename ErrorOf>
-std::vector<TriangleError> errors_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                                     const Surface& surface, const ErrorOf& error_of) {
-    std::vector<TriangleError> errors(triangles.size());
+void measure(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles, const Surface& surface,
+             const ErrorOf& error_of, std::vector<TriangleError>& errors) {
+    errors.resize(triangles.size());
     ThreadProbes probes(surface);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
         Surface::Probe& probe = probes.local();
@@ -144,7 +144,6 @@ std::vector<TriangleError> errors_of(const std::vector<Vec3>& points, const std:
             errors[t] =
                 error_of(points[triangles[t][0]], points[triangles[t][1]], points[triangles[t][2]], probe);
     });
-    return errors;
 }
 
 }  // namespace
@@ -152,15 +151,27 @@ std::vector<TriangleError> errors_of(const std::vector<Vec3>& points, const std:
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps, double refine_above) {
-    return errors_of(points, triangles, surface,
-                     [&](auto&... at) { return triangle_error(at..., steps, refine_above); });
+    std::vector<TriangleError> errors;
+    measure(
+        points, triangles, surface, [&](auto&... at) { return triangle_error(at..., steps, refine_above); },
+        errors);
+    return errors;
 }
 
 std::vector<TriangleError> certified_errors(const std::vector<Vec3>& points,
                                             const std::vector<Triangle>& triangles, const Surface& surface,
                                             double detail, double refine_above) {
-    return errors_of(points, triangles, surface,
-                     [&](auto&... at) { return certified_error(at..., detail, refine_above); });
+    std::vector<TriangleError> errors;
+    certified_errors(points, triangles, surface, detail, refine_above, errors);
+    return errors;
+}
+
+void certified_errors(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                      const Surface& surface, double detail, double refine_above,
+                      std::vector<TriangleError>& errors) {
+    measure(
+        points, triangles, surface, [&](auto&... at) { return certified_error(at..., detail, refine_above); },
+        errors);
 }
 
 std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell,

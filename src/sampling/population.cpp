@@ -157,7 +157,7 @@ Densifier::Densifier(Particles& particles, const Surface& surface, double detail
       most_(most),
       next_id_(next_id),
       probe_(surface.probe()),
-      grid_(2.0 * detail) {}
+      grid_(2.0 * detail, particles.size() + particles.size() / 16) {}
 
 std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
     constexpr double kShrink = 0.6;

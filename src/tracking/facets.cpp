@@ -4,18 +4,20 @@
 
 namespace isotrack {
 
-std::vector<Facet> facets_of(const CarvedSurface& carved, const std::vector<Vec3>& vertices) {
-    std::vector<Facet> facets(carved.triangles.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, facets.size(), 1024), [&](const auto& range) {
-        for (std::size_t t = range.begin(); t < range.end(); ++t) {
-            const auto& [i, j, k] = carved.triangles[t];
-            const bool whole = carved.inside_cell[t] >= 0 && carved.particle[i] >= 0 &&
-                               carved.particle[j] >= 0 && carved.particle[k] >= 0;
-            facets[t] = {whole ? 4 * carved.inside_cell[t] + carved.inside_facet[t] : -1,
-                         {vertices[i].cast<float>(), vertices[j].cast<float>(), vertices[k].cast<float>()}};
-        }
+Facet MeshFacets::operator[](std::size_t triangle) const {
+    const auto& [i, j, k] = carved_.triangles[triangle];
+    const bool whole = carved_.inside_cell[triangle] >= 0 && carved_.particle[i] >= 0 &&
+                       carved_.particle[j] >= 0 && carved_.particle[k] >= 0;
+    return {whole ? 4 * carved_.inside_cell[triangle] + carved_.inside_facet[triangle] : -1,
+            {vertices_[i].cast<float>(), vertices_[j].cast<float>(), vertices_[k].cast<float>()}};
+}
+
+void MeshFacets::write_to(std::vector<Facet>& facets) const {
+    facets = {};  // first, as there are many
+    facets.resize(size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 1024), [&](const auto& range) {
+        for (std::size_t t = range.begin(); t < range.end(); ++t) facets[t] = (*this)[t];
     });
-    return facets;
 }
 
 }  // namespace isotrack

@@ -16,21 +16,34 @@ struct Facet {
     bool operator==(const Facet& o) const { return key >= 0 && key == o.key && corner == o.corner; }
 };
 
-/// One per triangle, in their order. `vertices` hold no more digits than floats.
-std::vector<Facet> facets_of(const CarvedSurface& carved, const std::vector<Vec3>& vertices);
+/// Those of a mesh, one per triangle, in their order; made when they are asked for, as there are many.
+/// `vertices` hold no more digits than floats.
+class MeshFacets {
+public:
+    MeshFacets(const CarvedSurface& carved, const std::vector<Vec3>& vertices)
+        : carved_(carved), vertices_(vertices) {}
+    std::size_t size() const { return carved_.triangles.size(); }
+    Facet operator[](std::size_t triangle) const;
+    void write_to(std::vector<Facet>& facets) const;
+
+private:
+    const CarvedSurface& carved_;
+    const std::vector<Vec3>& vertices_;
+};
 
 /// Calls `same` with the numbers of each facet that is in both, in `now` and in `before`; `came` with those
-/// only in `now`, `went` with those only in `before`.
+/// only in `now`, and what they are, `went` with those only in `before`.
 template <typename Same, typename Came, typename Went>
-void compare(const std::vector<Facet>& now, const std::vector<Facet>& before, const Same& same,
-             const Came& came, const Went& went) {
+void compare(const MeshFacets& now, const std::vector<Facet>& before, const Same& same, const Came& came,
+             const Went& went) {
     std::size_t old = 0;
     for (std::size_t f = 0; f < now.size(); ++f) {
-        while (now[f].key >= 0 && old < before.size() && before[old].key < now[f].key) went(old++);
-        if (old < before.size() && now[f] == before[old])
+        const Facet facet = now[f];
+        while (facet.key >= 0 && old < before.size() && before[old].key < facet.key) went(old++);
+        if (old < before.size() && facet == before[old])
             same(f, old++);
         else
-            came(f);
+            came(f, facet);
     }
     while (old < before.size()) went(old++);
 }

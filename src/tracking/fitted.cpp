@@ -22,11 +22,11 @@ void Fitted::take(const FrameMesh& mesh, std::size_t particles) {
 
 void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface) {
     const auto& triangles = mesh.carved.triangles;
-    std::vector<Facet> facets = facets_of(mesh.carved, mesh.on_surface);
+    const MeshFacets facets(mesh.carved, mesh.on_surface);
     std::vector<char> movable(mesh.vertices.size(), 0);
     compare(
         facets, facets_, [](std::size_t, std::size_t) {},
-        [&](std::size_t f) {
+        [&](std::size_t f, const Facet&) {
             for (const int v : triangles[f]) movable[v] = 1;
         },
         [](std::size_t) {});
@@ -47,7 +47,7 @@ void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface&
     }
     fit(mesh.vertices, triangles, surface, kFitSteps, movable);
     for (Vec3& v : mesh.vertices) v = to_float_precision(v);
-    facets_ = std::move(facets);
+    facets.write_to(facets_);
     take(mesh, particles);
 }
 

@@ -48,7 +48,9 @@ void FrameWork::blunt() {
         for (const CrossingGrid& between : inspector->between()) reached.push_back(&between);
     };
     take_what_is_looked_at();
-    const auto errors_before = inspection.errors;
+    std::vector<double> farthest_before;  // of each triangle
+    farthest_before.reserve(inspection.errors->size());
+    for (const TriangleError& error : *inspection.errors) farthest_before.push_back(error.largest);
     const std::vector<Vec3> vertices_before = mesh.vertices;
     const std::vector<Triangle> triangles_before = mesh.carved.triangles;
     Blunter blunter(mesh.vertices, mesh.carved.triangles, movable(), surface, reached,
@@ -59,6 +61,7 @@ void FrameWork::blunt() {
         for (const Blunting& change : blunter.changes())
             if (change.vertex < 0)
                 for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
+        inspection = {};  // first: there are many errors
         inspection = inspector->inspect_both_ways(mesh);
         if (look_between) {
             inspector->look_between(mesh, inspection);
@@ -67,7 +70,7 @@ void FrameWork::blunt() {
         std::vector<Vec3> places;
         for (const Blunting& change : blunter.changes()) {
             double limit = kCertified * limits.tolerance;
-            for (const int t : change.triangle) limit = std::max(limit, (*errors_before)[t].largest);
+            for (const int t : change.triangle) limit = std::max(limit, farthest_before[t]);
             for (const int t : change.triangle)
                 if (const TriangleError& error = (*inspection.errors)[t]; error.largest > limit)
                     places.push_back(error.where);

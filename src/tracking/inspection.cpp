@@ -128,9 +128,14 @@ void Inspector::restart() {
     looks_ = 0;
 }
 
-void Inspector::expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles) {
-    expected_.emplace(Expected{{particles.size(), triangles}, {}});
-    expected_->errors = errors_of(particles, expected_->triangles.triangles());
+std::function<void()> Inspector::expect(const std::vector<Vec3>& particles,
+                                        const std::vector<Triangle>& triangles) {
+    expected_.emplace().errors.resize(triangles.size());
+    return [this, &particles, &triangles] {
+        expected_->triangles = {particles.size(), triangles};
+        certified_errors(particles, expected_->triangles.triangles(), surface_, limits_.detail,
+                         kSuspect * limits_.tolerance, expected_->errors);
+    };
 }
 
 std::vector<TriangleError> Inspector::errors_of(const std::vector<Vec3>& vertices,
@@ -145,7 +150,7 @@ std::vector<TriangleError> Inspector::errors_of(const std::vector<Vec3>& corners
 }
 
 std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
-    std::vector<Facet> facets = facets_of(mesh.carved, mesh.vertices);
+    const MeshFacets facets(mesh.carved, mesh.vertices);
     std::vector<const TriangleError*> known(facets.size(), nullptr);
     std::vector<char> seen(facets.size(), 0);  // in the mesh before
     changes_ = {};
@@ -155,8 +160,8 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
             known[f] = &(*errors_)[old];
             seen[f] = 1;
         },
-        [&](std::size_t f) {
-            if (measured_) changes_.came.push_back(facets[f]);
+        [&](std::size_t f, const Facet& facet) {
+            if (measured_) changes_.came.push_back(facet);
             const auto [corner, whole] = corners_of(mesh.carved, f);
             const int e = expected_ && whole ? expected_->triangles.find(corner) : -1;
             if (e >= 0) known[f] = &expected_->errors[e];
@@ -186,7 +191,7 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     for (std::size_t f = 0; f < facets.size(); ++f)
         if (too_far[f] && (seen[f] || !probe->project((*measured)[f].where)))
             in_vain.push_back((*measured)[f].where);
-    facets_ = std::move(facets);
+    facets.write_to(facets_);
     errors_ = result.errors = measured;
     expected_.reset();  // vertices may move from now on
     return in_vain;
@@ -333,20 +338,29 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     std::vector<Shortage> result;
     const auto probe = surface.probe();
     const CarvedSurface& carved = mesh.carved;
-    std::vector<char> fails(inspection.errors->size());
-    std::vector<std::optional<Shortage>> at_crease(fails.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, fails.size(), 1024), [&](const auto& range) {
-        for (std::size_t t = range.begin(); t < range.end(); ++t) {
+    struct Failing {
+        std::size_t triangle;
+        std::optional<Shortage> at_crease;  // alone
+    };
+    const auto find_failing = [&](std::size_t begin, std::size_t end, std::vector<Failing>& found) {
+        for (std::size_t t = begin; t < end; ++t) {
             const auto [corner, whole] = corners_of(carved, t);
             const TriangleError& error = (*inspection.errors)[t];
-            fails[t] = is_too_far(error, limits.tolerance) || is_turned(error) ||
-                       (whole && is_needle_even_fitted(mesh, particles, t, corner, limits.detail));
-            if (!fails[t] && whole) at_crease[t] = crease_shortage(mesh, particles, t, corner, limits.detail);
+            if (is_too_far(error, limits.tolerance) || is_turned(error) ||
+                (whole && is_needle_even_fitted(mesh, particles, t, corner, limits.detail)))
+                found.push_back({t, std::nullopt});
+            else if (whole)
+                if (auto at_crease = crease_shortage(mesh, particles, t, corner, limits.detail))
+                    found.push_back({t, at_crease});
         }
-    });
-    for (std::size_t t = 0; t < fails.size(); ++t) {
-        if (at_crease[t]) result.push_back(*at_crease[t]);
-        if (!fails[t]) continue;
+    };
+    constexpr std::size_t kTrianglesPerBlock = 1024;
+    for (const auto& [t, at_crease] :
+         find_in_blocks<Failing>(inspection.errors->size(), kTrianglesPerBlock, find_failing)) {
+        if (at_crease) {
+            result.push_back(*at_crease);
+            continue;
+        }
         const auto [corner, whole] = corners_of(carved, t);
         const auto x = whole ? dual_crossing(cells, particles.position, carved.inside_cell[t],
                                              carved.inside_facet[t], *probe)

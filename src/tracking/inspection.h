@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -53,9 +54,11 @@ public:
 
     /// From now on come meshes of other particles: those before are forgotten.
     void restart();
-    /// Before the first mesh is there: measures triangles that it is likely to have. Where it does, with
-    /// vertices on these very places, nothing is measured again.
-    void expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles);
+    /// Before the first mesh is there: triangles that it is likely to have, which must stay until what is
+    /// returned was called. That measures them, on any thread; most of the memory is taken here, because
+    /// what a thread gives back is kept for it alone. Where the mesh has them, with vertices on these very
+    /// places, nothing is measured again.
+    std::function<void()> expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles);
 
     /// From mesh to surface alone.
     Inspection inspect(const FrameMesh& mesh);

@@ -386,6 +386,7 @@ private:
 
 void Tracker::Impl::Making::make_mesh() {
     auto& seconds = work_.frame.seconds;
+    work_.mesh = {};
     work_.mesh = tracker_.carve_mesh(work_.surface, seconds);
     if (!options().fit) return;
     const StageTimer timer(seconds, "fit");
@@ -403,8 +404,11 @@ void Tracker::Impl::Making::mesh_particles() {
     LastMesh& last_mesh = tracker_.last_mesh;
     for (int mending = 0;; ++mending) {
         inspector.restart();
+        std::function<void()> measure_expected;
+        if (!options().fit && !in_paper())
+            measure_expected = inspector.expect(particles().position, last_mesh.triangles);
         tracker_.tetrahedralise(true, work_.frame.seconds, [&] {
-            if (!options().fit && !in_paper()) inspector.expect(particles().position, last_mesh.triangles);
+            if (measure_expected) measure_expected();
             if (!is_thick()) inspector.prepare_topology();
         });
         fitted_ = {};

@@ -17,6 +17,7 @@ inline Triangle from_least_corner(Triangle t) {
 /// Oriented triangles over so many vertices. Read-only, so threads may share it.
 class TriangleIndex {
 public:
+    TriangleIndex() = default;
     TriangleIndex(std::size_t vertices, const std::vector<Triangle>& triangles)
         : first_(vertices + 1, 0), triangles_(triangles) {
         for (Triangle& t : triangles_) t = from_least_corner(t);

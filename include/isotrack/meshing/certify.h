@@ -53,6 +53,10 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
 std::vector<TriangleError> certified_errors(const std::vector<Vec3>& points,
                                             const std::vector<Triangle>& triangles, const Surface& surface,
                                             double detail, double refine_above);
+/// Into memory of the caller.
+void certified_errors(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                      const Surface& surface, double detail, double refine_above,
+                      std::vector<TriangleError>& errors);
 
 /// Where to put a particle that mends a facet of the boundary between inside and outside: the point of the
 /// surface at the same distance from the facet's three vertices, on the dual edge between the circumcentres

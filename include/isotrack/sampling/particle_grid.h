@@ -13,8 +13,11 @@ namespace isotrack {
 /// insertion.
 class PointGrid {
 public:
-    /// `cell_size`: world units, > 0; best near the usual query radius.
-    explicit PointGrid(double cell_size) : cell_size_(cell_size), buckets_(kFewest) {}
+    /// `cell_size`: world units, > 0; best near the usual query radius. `expected`: so many points at least.
+    explicit PointGrid(double cell_size, std::size_t expected = 0)
+        : cell_size_(cell_size), buckets_(kFewest) {
+        entries_.reserve(expected);
+    }
 
     void insert(const Vec3& p, int index) {
         if (entries_.size() == buckets_.size()) {
