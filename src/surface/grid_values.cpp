@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "surface/inactive_tiles.h"
+
 namespace isotrack {
 
 using openvdb::Coord;
@@ -16,7 +18,10 @@ using Leaf = FloatTree::LeafNodeType;
 
 bool is_plain(const FloatGrid& grid) {
     const float background = grid.background();
-    return background > 0.0f && std::isfinite(background) && grid.tree().activeTileCount() == 0;
+    if (!(background > 0.0f) || !std::isfinite(background) || grid.tree().activeTileCount() > 0) return false;
+    bool finite = true;
+    for_each_inactive_tile(grid.tree(), [&](float value) { finite = finite && std::isfinite(value); });
+    return finite;
 }
 
 template <typename GridType>

@@ -7,7 +7,8 @@ namespace isotrack {
 
 constexpr double kFarVoxels = 10.0;  ///< World distances are clamped to so many voxels.
 
-/// Whether a grid can be sampled as it is, once its values are known to be finite world distances.
+/// Whether a grid can be sampled as it is, once the values of its voxels are known to be finite world
+/// distances.
 bool is_plain(const openvdb::FloatGrid& grid);
 
 /// A float copy with `sign * (value - iso)`, active tiles turned into voxels, and no value that is not

@@ -22,6 +22,7 @@
 #include "surface/crossed_edges.h"
 #include "surface/grid_probe.h"
 #include "surface/grid_values.h"
+#include "surface/inactive_tiles.h"
 #include "surface/lattice_mesh.h"
 
 namespace isotrack {
@@ -86,9 +87,7 @@ double depth_inside(const FloatTree& tree) {
             return so_far;
         },
         least);
-    auto tile = tree.cbeginValueOff();
-    tile.setMaxDepth(FloatTree::ValueOffCIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) result = least(result, depth(*tile));
+    for_each_inactive_tile(tree, [&](float value) { result = least(result, depth(value)); });
     return result;
 }
 
@@ -141,6 +140,11 @@ struct LevelSet::Impl {
         const Slope in_grid_units = slope_at_surface(grid->constTree(), map, found.edges);
         refuse_beyond_band(options.iso, found, in_grid_units.median * map.voxel_size);
         scale = value_scale_for(in_grid_units.median, map.voxel_size, grid_class == openvdb::GRID_LEVEL_SET);
+        if (!std::isfinite(static_cast<float>(scale)))
+            throw InputError(
+                grid_label(*source) +
+                " has values that hardly differ from voxel to voxel at its surface; multiply them to be "
+                "distances");
         if (in_grid_units.mean > 0.0) slope = std::min(1.0, scale * in_grid_units.mean);
         border_crossings = found.at_border;
 

@@ -472,6 +472,51 @@ TEST(LevelSet, CountsValuesThatAreNotFiniteAsOutside) {
     }
 }
 
+TEST(LevelSet, HasNoValuesThatAreNotFiniteWhereTheBackgroundIsRight) {
+    // Far outside and far inside, active and not; there are more leaves than one thread takes.
+    for (const bool active : {true, false})
+        for (const double far : {kInf, -kInf, kNaN}) {
+            const auto grid = sphere_grid<openvdb::FloatGrid>(uniform(0.02), 0.12);
+            ASSERT_GT(grid->tree().leafCount(), 1000u);
+            auto accessor = grid->getAccessor();
+            for (const int x : {46, -55}) {  // 0.08 inside, 0.1 outside
+                const openvdb::Coord c(x, 0, 0);
+                accessor.setValue(c, static_cast<float>(far));
+                if (!active) accessor.setActiveState(c, false);
+            }
+            const LevelSet level_set(grid);
+            for (auto value = level_set.grid()->cbeginValueAll(); value; ++value)
+                ASSERT_TRUE(std::isfinite(*value)) << active << " " << far;
+            const auto probe = level_set.probe();
+            for (const Vec3& p : near_sphere(500, 0.0)) {
+                if (std::abs(p.x()) > 0.9) continue;
+                EXPECT_NEAR(probe->value(p), 0.0, 2e-4) << active << " " << far;
+            }
+        }
+}
+
+TEST(LevelSet, CountsTilesThatAreNotFiniteAsFar) {
+    for (const double far : {kInf, kNaN}) {
+        const auto grid = sphere_grid<openvdb::FloatGrid>(uniform(0.04), 0.12);
+        grid->tree().addTile(1, openvdb::Coord(0), static_cast<float>(-far), false);
+        grid->tree().addTile(1, openvdb::Coord(32, 0, 0), static_cast<float>(far), false);
+        const LevelSet level_set(grid);
+        for (const Surface::Crossing& c : level_set.crossings()) ASSERT_TRUE(c.point.allFinite()) << far;
+        EXPECT_TRUE(std::isfinite(level_set.probe()->value({0.1, 0.1, 0.1}))) << far;
+        EXPECT_GT(level_set.probe()->value({1.4, 0.1, 0.1}), 0.0) << far;
+    }
+}
+
+TEST(LevelSet, RefusesValuesThatCannotBeMadeDistances) {
+    const auto grid = dense_block(16, 0.1, [](const Vec3& p) { return p.z() > 0.75 ? 1e-41 : -1e-41; });
+    try {
+        LevelSet{grid};
+        FAIL();
+    } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("hardly differ"), std::string::npos) << error.what();
+    }
+}
+
 TEST(LevelSet, CountsMinusInfinityAsInside) {
     const Vec3 centre(0.8, 0.8, 0.8);
     const auto grid = dense_block(32, 0.05, [&](const Vec3& p) {
