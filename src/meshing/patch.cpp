@@ -35,7 +35,7 @@ double squared_distance_to_edge(const Vec3& p, const Vec3& a, const Vec3& b) {
     return (ap - t * ab).squaredNorm();
 }
 
-/// The edges of triangles, ascending by their ends, the lower first, those that run upwards first of equals.
+/// The edges of triangles, ascending by their ends, the lower first.
 class SortedEdges {
 public:
     explicit SortedEdges(const std::vector<Triangle>& triangles) {
@@ -91,19 +91,22 @@ struct Numbers {
     long components, euler;
 };
 
-/// Of triangles with all their edges and corners, which are below `vertices`.
-Numbers numbers_of(const std::vector<Triangle>& triangles, std::size_t vertices) {
-    std::vector<char> is_corner(vertices, 0);
-    for (const Triangle& t : triangles)
-        for (const int v : t) is_corner[v] = 1;
-    const auto corners = static_cast<long>(std::count(is_corner.begin(), is_corner.end(), 1));
-    DisjointSets sets(vertices);
-    long components = corners, edges = 0;
+/// Of triangles with all their edges and corners.
+Numbers numbers_of(const std::vector<Triangle>& triangles) {
+    std::vector<int> corners;
+    for (const Triangle& t : triangles) corners.insert(corners.end(), t.begin(), t.end());
+    std::sort(corners.begin(), corners.end());
+    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    const auto number_of = [&](int v) {
+        return static_cast<int>(std::lower_bound(corners.begin(), corners.end(), v) - corners.begin());
+    };
+    DisjointSets sets(corners.size());
+    long components = static_cast<long>(corners.size()), edges = 0;
     SortedEdges(triangles).for_each([&](int low, int high, int, int) {
-        components -= sets.join(low, high);
+        components -= sets.join(number_of(low), number_of(high));
         ++edges;
     });
-    return {components, corners - edges + static_cast<long>(triangles.size())};
+    return {components, static_cast<long>(corners.size()) - edges + static_cast<long>(triangles.size())};
 }
 
 /// Of a border that is pinched nowhere.
@@ -418,7 +421,7 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
         if (std::find(stays.begin(), stays.end(), 0) == stays.end()) break;
         compact(coming, stays);
     }
-    const Numbers now = numbers_of(all, at.size()), before = numbers_of(going, points.size());
+    const Numbers now = numbers_of(all), before = numbers_of(going);
     patch.components = now.components - before.components;
     patch.euler = now.euler - before.euler;
     for (Triangle& t : all)
