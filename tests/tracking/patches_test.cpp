@@ -1,4 +1,4 @@
-// Patches and trials, on meshes whose faults are known.
+// Patches on meshes whose faults are known.
 #include "tracking/patches.h"
 
 #include <gtest/gtest.h>
@@ -14,35 +14,22 @@
 #include "isotrack/surface/level_set.h"
 #include "isotrack/surface/shapes.h"
 #include "support/carved.h"
+#include "support/lattice_grid.h"
 
 namespace isotrack {
 namespace {
 
 using support::Carved;
 using support::Inspected;
-
-/// Three for each triangle.
-std::vector<Vec3> corners_of(const FrameMesh& mesh) {
-    std::vector<Vec3> result;
-    for (const Triangle& t : mesh.carved.triangles)
-        for (const int v : t) result.push_back(mesh.vertices[v]);
-    return result;
-}
+using support::lattice_grid;
 
 /// A disk of one layer of lattice nodes, which are inside by little: about a third of a voxel thick. Beside
 /// it a ball, so that the values inside are known for distances.
 openvdb::FloatGrid::Ptr thin_disk_and_ball() {
-    auto grid = openvdb::FloatGrid::create(3.0f);
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
-    auto values = grid->getAccessor();
-    for (int x = -13; x <= 26; ++x)
-        for (int y = -13; y <= 13; ++y)
-            for (int z = -9; z <= 9; ++z) {
-                const double disk = std::max(std::abs(z) - 0.15, std::hypot(x + 0.1, y - 0.2) - 8.3);
-                const double ball = (Vec3(x, y, z) - Vec3(18.2, 0.1, 0.3)).norm() - 5.3;
-                values.setValue({x, y, z}, static_cast<float>(std::clamp(std::min(disk, ball), -3.0, 3.0)));
-            }
-    return grid;
+    return lattice_grid({-13, -13, -9}, {26, 13, 9}, [](const Vec3& p) {
+        const double disk = std::max(std::abs(p.z()) - 0.15, std::hypot(p.x() + 0.1, p.y() - 0.2) - 8.3);
+        return std::min(disk, (p - Vec3(18.2, 0.1, 0.3)).norm() - 5.3);
+    });
 }
 
 void expect_sound(const FrameMesh& mesh) {
@@ -85,16 +72,9 @@ TEST(Patches, FillAHoleInAThinSheet) {
 
 /// A ring of about a voxel and a half across.
 openvdb::FloatGrid::Ptr thin_ring() {
-    auto grid = openvdb::FloatGrid::create(3.0f);
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
-    auto values = grid->getAccessor();
-    for (int x = -13; x <= 13; ++x)
-        for (int y = -13; y <= 13; ++y)
-            for (int z = -6; z <= 6; ++z) {
-                const double ring = std::hypot(std::hypot(x + 0.2, y - 0.1) - 7.3, z + 0.1) - 0.85;
-                values.setValue({x, y, z}, static_cast<float>(std::min(ring, 3.0)));
-            }
-    return grid;
+    return lattice_grid({-13, -13, -6}, {13, 13, 6}, [](const Vec3& p) {
+        return std::hypot(std::hypot(p.x() + 0.2, p.y() - 0.1) - 7.3, p.z() + 0.1) - 0.85;
+    });
 }
 
 TEST(Patches, CloseARingThatIsCut) {
@@ -109,16 +89,9 @@ double to_balls_and_another(const Vec3& p) {
     return std::min(to_balls(p), (p - Vec3(-8.1, 0.2, 0.1)).norm() - 1.3);
 }
 
-openvdb::FloatGrid::Ptr grid_of(double (*distance)(const Vec3&)) {
-    auto grid = openvdb::FloatGrid::create(3.0f);
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
-    auto values = grid->getAccessor();
-    for (int x = -12; x <= 12; ++x)
-        for (int y = -9; y <= 9; ++y)
-            for (int z = -9; z <= 9; ++z)
-                values.setValue({x, y, z},
-                                static_cast<float>(std::clamp(distance(Vec3(x, y, z)), -3.0, 3.0)));
-    return grid;
+template <typename Distance>
+openvdb::FloatGrid::Ptr grid_of(const Distance& distance) {
+    return lattice_grid({-12, -9, -9}, {12, 9, 9}, distance);
 }
 
 TEST(Patches, PartADropFromABallWhereNoNodeTellsThemApart) {
@@ -161,37 +134,6 @@ TEST(Patches, AreTheSameAtAnyNumberOfThreads) {
     const FrameMesh one = patched(1), two = patched(2);
     EXPECT_EQ(one.vertices, two.vertices);
     EXPECT_EQ(one.carved.triangles, two.carved.triangles);
-}
-
-TEST(MeshTrials, TakeNoMeshThatIsFartherOffOrMissesMore) {
-    const LevelSet surface(grid_of(to_balls));
-    const Carved carved(surface, 0.5, 0.8);
-    FrameMesh mesh = carved.mesh();
-    const FrameMesh before = mesh;
-    Inspected now(carved, mesh);
-    const auto farthest = std::max_element(mesh.vertices.begin(), mesh.vertices.end(),
-                                           [](const Vec3& a, const Vec3& b) { return a.y() < b.y(); }) -
-                          mesh.vertices.begin();
-    for (const double dent : {0.9, -0.9}) {
-        FrameMesh other = before;
-        other.vertices[farthest].y() -= dent;
-        EXPECT_FALSE(now.trials.may_have(corners_of(other)));
-        EXPECT_FALSE(now.trials.try_mesh(other));
-    }
-    EXPECT_TRUE(now.trials.may_have(corners_of(before)));
-    // Without the drop: no triangle is farther off.
-    std::vector<char> of_drop;
-    for (const Triangle& t : before.carved.triangles) of_drop.push_back(before.vertices[t[0]].x() > 6.3);
-    EXPECT_FALSE(now.trials.try_mesh(without(before, of_drop)));
-    EXPECT_EQ(mesh.vertices, before.vertices);
-    EXPECT_EQ(now.inspection.errors->size(), before.carved.triangles.size());
-    EXPECT_TRUE(now.inspection.missed.empty());
-
-    FrameMesh nearer = before;
-    std::swap(nearer.carved.triangles.front(), nearer.carved.triangles.back());
-    EXPECT_TRUE(now.trials.try_mesh(nearer));
-    EXPECT_FALSE(now.trials.try_to_mend(before));  // nothing fails
-    EXPECT_EQ(mesh.carved.triangles, nearer.carved.triangles);
 }
 
 TEST(Patches, MendWhatIsTooFarOffAndLeaveTheRest) {

@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "isotrack/meshing/mesh_topology.h"
 #include "isotrack/surface/shapes.h"
 #include "support/carved.h"
 
@@ -56,9 +56,6 @@ void take_away_and_reach_out(const Surface& surface, char label) {
     const double tolerance = 0.1;
     Carved carved(surface, tolerance);
     const CellLabels right = carved.labels;
-    const auto topology = [](const FrameMesh& mesh) {
-        return mesh_topology({mesh.vertices, mesh.carved.triangles, {}, {}});
-    };
     int reached = 0;
     for (int p = 0; p < static_cast<int>(carved.particles.size()); ++p) {
         carved.labels = right;
@@ -88,8 +85,8 @@ void take_away_and_reach_out(const Surface& surface, char label) {
         if (reach(carved.limits) == 0) continue;  // all its cells are too far from the surface
         const FrameMesh after = carved.mesh();
         EXPECT_TRUE(uses(after));
-        EXPECT_TRUE(topology(after).closed() && topology(after).manifold());
-        EXPECT_EQ(topology(after).euler, topology(before).euler);
+        EXPECT_TRUE(topology_of(after).closed() && topology_of(after).manifold());
+        EXPECT_EQ(topology_of(after).euler, topology_of(before).euler);
         for (const TriangleError& e : *carved.inspect(after).errors) EXPECT_LE(e.largest, tolerance);
         ++reached;
     }

@@ -12,6 +12,7 @@
 #include "isotrack/meshing/self_intersections.h"
 #include "isotrack/surface/level_set.h"
 #include "support/carved.h"
+#include "support/lattice_grid.h"
 #include "tracking/lost_drops.h"
 
 namespace isotrack {
@@ -19,20 +20,18 @@ namespace {
 
 using support::Carved;
 using support::Inspected;
+using support::lattice_grid;
+
+double to_ball(const Vec3& p) {
+    return (p - Vec3(0.2, 0.1, 0.3)).norm() - 5.3;
+}
 
 /// A ball with a spike of one line of nodes.
 openvdb::FloatGrid::Ptr ball_with_spike() {
-    auto grid = openvdb::FloatGrid::create(3.0f);
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
-    auto values = grid->getAccessor();
-    for (int x = -9; x <= 16; ++x)
-        for (int y = -9; y <= 9; ++y)
-            for (int z = -9; z <= 9; ++z) {
-                const double spike = std::max({std::hypot(y, z) - 0.45, 2.0 - x, x - 12.2}),
-                             ball = (Vec3(x, y, z) - Vec3(0.2, 0.1, 0.3)).norm() - 5.3;
-                values.setValue({x, y, z}, static_cast<float>(std::clamp(std::min(spike, ball), -3.0, 3.0)));
-            }
-    return grid;
+    return lattice_grid({-9, -9, -9}, {16, 9, 9}, [](const Vec3& p) {
+        const double spike = std::max({std::hypot(p.y(), p.z()) - 0.45, 2.0 - p.x(), p.x() - 12.2});
+        return std::min(spike, to_ball(p));
+    });
 }
 
 /// Of the ball with its spike cut through at some places: joins specks at this tolerance, then removes what
@@ -40,16 +39,13 @@ openvdb::FloatGrid::Ptr ball_with_spike() {
 void cut_a_spike(const std::vector<double>& at, double tolerance, std::size_t joined, bool reaches_its_end) {
     const LevelSet surface(ball_with_spike());
     Carved carved(surface, tolerance, 0.3);
-    const auto topology = [](const FrameMesh& mesh) {
-        return mesh_topology({mesh.vertices, mesh.carved.triangles, {}, {}});
-    };
-    ASSERT_EQ(topology(carved.mesh()).components, 1u);
-    ASSERT_EQ(topology(carved.mesh()).euler, 2);
+    ASSERT_EQ(topology_of(carved.mesh()).components, 1u);
+    ASSERT_EQ(topology_of(carved.mesh()).euler, 2);
     for (int c = 0; c < static_cast<int>(carved.labels.size()); ++c)
         for (const double x : at)
             if (carved.labels[c] && std::abs(carved.centroid(c).x() - x) < 0.5) carved.labels[c] = 0;
     FrameMesh mesh = carved.mesh();
-    ASSERT_GT(topology(mesh).components, 1u);
+    ASSERT_GT(topology_of(mesh).components, 1u);
 
     Inspected now(carved, mesh);
     for (std::size_t t = 0; t < mesh.carved.triangles.size(); ++t) {
@@ -61,9 +57,9 @@ void cut_a_spike(const std::vector<double>& at, double tolerance, std::size_t jo
                           surface, carved.limits),
               joined);
     remove_specks(mesh, now.inspection, now.inspector, carved.limits);
-    EXPECT_EQ(topology(mesh).components, 1u);
-    EXPECT_EQ(topology(mesh).euler, 2);
-    EXPECT_TRUE(topology(mesh).closed() && topology(mesh).manifold());
+    EXPECT_EQ(topology_of(mesh).components, 1u);
+    EXPECT_EQ(topology_of(mesh).euler, 2);
+    EXPECT_TRUE(topology_of(mesh).closed() && topology_of(mesh).manifold());
     EXPECT_TRUE(now.inspection.missed.empty());
     EXPECT_EQ(
         std::any_of(mesh.vertices.begin(), mesh.vertices.end(), [](const Vec3& p) { return p.x() > 11.9; }),
@@ -81,15 +77,8 @@ TEST(Specks, AreRemovedWhereNothingIsMissedWithoutThem) {
 
 /// A ball, and beside it nodes that are inside by little: one alone and two in a row.
 openvdb::FloatGrid::Ptr ball_and_single_nodes() {
-    auto grid = openvdb::FloatGrid::create(3.0f);
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    const auto grid = lattice_grid({-9, -9, -9}, {18, 9, 9}, to_ball);
     auto values = grid->getAccessor();
-    for (int x = -9; x <= 18; ++x)
-        for (int y = -9; y <= 9; ++y)
-            for (int z = -9; z <= 9; ++z) {
-                const double ball = (Vec3(x, y, z) - Vec3(0.2, 0.1, 0.3)).norm() - 5.3;
-                values.setValue({x, y, z}, static_cast<float>(std::clamp(ball, -3.0, 3.0)));
-            }
     values.setValue({9, 0, 0}, -0.01f);
     values.setValue({13, 2, 0}, -0.02f);
     values.setValue({13, 3, 0}, -0.3f);
@@ -102,9 +91,7 @@ TEST(LostDrops, ArePutInWhereTheMeshHasNothingOfThem) {
     for (int c = 0; c < static_cast<int>(carved.labels.size()); ++c)
         if ((carved.centroid(c) - Vec3(0.2, 0.1, 0.3)).norm() > 5.28) carved.labels[c] = 0;
     FrameMesh mesh = carved.mesh();
-    const auto as_mesh = [&] { return TriangleMesh{mesh.vertices, mesh.carved.triangles, {}, {}}; };
-    const std::size_t components = mesh_topology(as_mesh()).components;
-    const long euler = mesh_topology(as_mesh()).euler;
+    const MeshTopology before = topology_of(mesh);
     const std::size_t vertices = mesh.vertices.size();
 
     Inspected now(carved, mesh);
@@ -112,11 +99,11 @@ TEST(LostDrops, ArePutInWhereTheMeshHasNothingOfThem) {
     ASSERT_EQ(lost.size(), 2u);
     EXPECT_EQ(lost[0].size() + lost[1].size(), 3u);
     EXPECT_TRUE(put_in_drops(lost, mesh, now.inspection, now.inspector, surface));
-    const MeshTopology then = mesh_topology(as_mesh());
-    EXPECT_EQ(then.components, components + 2);
-    EXPECT_EQ(then.euler, euler + 4);
+    const MeshTopology then = topology_of(mesh);
+    EXPECT_EQ(then.components, before.components + 2);
+    EXPECT_EQ(then.euler, before.euler + 4);
     EXPECT_TRUE(then.closed() && then.oriented() && then.manifold());
-    EXPECT_TRUE(self_intersections(as_mesh()).empty());
+    EXPECT_TRUE(self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}).empty());
     EXPECT_EQ(now.inspection.errors->size(), mesh.carved.triangles.size());
     EXPECT_EQ(mesh.on_surface.size(), mesh.vertices.size());
     EXPECT_EQ(mesh.carved.particle.size(), mesh.vertices.size());

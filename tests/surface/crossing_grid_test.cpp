@@ -1,0 +1,75 @@
+#include "isotrack/surface/crossing_grid.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "isotrack/surface/shapes.h"
+
+namespace isotrack {
+namespace {
+
+constexpr double kResolution = 0.05;
+
+/// Point and direction, to be sorted.
+using Row = std::array<double, 6>;
+
+Row row_of(const Surface::Crossing& c) {
+    return {c.point.x(), c.point.y(), c.point.z(), c.outward.x(), c.outward.y(), c.outward.z()};
+}
+
+TEST(CrossingGrid, HoldsTheCrossingsOfASurface) {
+    const auto torus = shapes::torus({0.1, 0.2, 0.3}, 1.0, 0.4, kResolution);
+    std::vector<Row> wanted, found;
+    for (const Surface::Crossing& c : torus->crossings()) wanted.push_back(row_of(c));
+    const CrossingGrid grid(*torus);
+    for (std::size_t c = 0; c < grid.size(); ++c) found.push_back(row_of(grid[c]));
+    ASSERT_GT(wanted.size(), 1000u);
+    ASSERT_EQ(found.size(), wanted.size());
+    const double rounding = 1e-7 * torus->bounds().sizes().maxCoeff();
+    // The nearest of either; what is rounded may sort otherwise.
+    for (const auto& [of, among] : {std::pair(wanted, found), std::pair(found, wanted)})
+        for (std::size_t i = 0; i < of.size(); i += 37)
+            EXPECT_TRUE(std::any_of(among.begin(), among.end(), [&, &of = of](const Row& row) {
+                for (int k = 0; k < 6; ++k)
+                    if (!(std::abs(row[k] - of[i][k]) <= rounding)) return false;
+                return true;
+            }));
+}
+
+TEST(CrossingGrid, IsTheSameAtAnyNumberOfThreads) {
+    const auto torus = shapes::torus({0.1, 0.2, 0.3}, 1.0, 0.4, 0.02);
+    const auto rows = [&](std::size_t threads) {
+        const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+        const CrossingGrid grid(*torus);
+        std::vector<Row> result;
+        for (std::size_t c = 0; c < grid.size(); ++c) result.push_back(row_of(grid[c]));
+        return result;
+    };
+    const std::vector<Row> one = rows(1);
+    ASSERT_GT(one.size(), 3 * 4096u);  // several threads have some to do
+    for (int again = 0; again < 5; ++again) EXPECT_EQ(rows(2), one);
+}
+
+TEST(CrossingGrid, FindsWhatIsInABox) {
+    const auto torus = shapes::torus({0.1, 0.2, 0.3}, 1.0, 0.4, kResolution);
+    const CrossingGrid grid(*torus);
+    for (const Vec3& low : {Vec3(-2.0, -2.0, -2.0), Vec3(0.3, 0.1, 0.2), Vec3(1.3, 0.3, -0.1)})
+        for (const double size : {0.0, 0.07, 0.5, 9.0}) {
+            const Box box(low, low + Vec3(size, 0.7 * size, 1.3 * size));
+            std::vector<std::size_t> wanted, found;
+            for (std::size_t c = 0; c < grid.size(); ++c)
+                if (box.contains(grid[c].point)) wanted.push_back(c);
+            grid.for_each_in(box, [&](std::size_t c) { found.push_back(c); });
+            std::sort(found.begin(), found.end());
+            EXPECT_EQ(found, wanted);
+        }
+}
+
+}  // namespace
+}  // namespace isotrack
