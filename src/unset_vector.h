@@ -9,11 +9,14 @@
 
 namespace isotrack {
 
-/// Leaves new elements unset: no thread goes over all of them, and touches their memory, before those that
-/// fill them do.
+/// Leaves new elements unset, to be written before they are read: no thread goes over all of them, and touches
+/// their memory, before those that fill them do.
 template <typename T>
 struct LeaveUnset : std::allocator<T> {
     static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+    LeaveUnset() = default;
+    template <typename U>
+    LeaveUnset(const LeaveUnset<U>&) {}
     template <typename U>
     struct rebind {
         using other = LeaveUnset<U>;

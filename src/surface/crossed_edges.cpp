@@ -130,7 +130,7 @@ std::size_t write_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader&
     });
     for_each_face(leaf, sides, reader, [&](const FaceEdges& face) {
         if (face.edges == 0) return;
-        const float tile = reader.getValue(face.origin);
+        const float tile = reader.getValue(face.origin);  // where there is one, not a leaf
         const bool is_tile_on = reader.isValueOn(face.origin);
         for_each_bit(face.edges, [&](int i) {
             const int offset = offset_in(face.axis, face.up ? kDim - 1 : 0, i),
@@ -152,8 +152,9 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
     const std::size_t count = leaves.leafCount();
     std::atomic<bool> finite{true};
     const auto for_each_leaf = [&](const auto& visit) {
-        constexpr std::size_t kLeavesPerBlock = 512;
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kLeavesPerBlock), [&](const auto& range) {
+        constexpr std::size_t kLeaves =
+            512;  // a thread's at least: with fewer it knows few of its neighbours
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kLeaves), [&](const auto& range) {
             TreeReader reader(tree);
             LeafSigns signs;
             for (std::size_t n = range.begin(); n < range.end(); ++n) visit(n, leaves.leaf(n), reader, signs);
@@ -162,15 +163,16 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
     };
     // Counted first, so that each has its place in memory that is touched once.
     std::vector<std::size_t> first(count + 1, 0);
-    std::vector<long> parts(count);
+    std::vector<long> cell_parts_of(count);
     for_each_leaf([&](std::size_t n, const Leaf& leaf, TreeReader& reader, LeafSigns& signs) {
         const LeafSides sides(leaf, reader, signs);
         first[n + 1] = count_edges_of(leaf, sides, reader);
-        parts[n] = cell_parts(leaf, sides, reader);
+        cell_parts_of[n] = cell_parts(leaf, sides, reader);
     });
-    if (!finite) return {false, {}, {}, 0, 0};
-    std::partial_sum(first.begin(), first.end(), first.begin());
     CrossedEdges result;
+    result.finite = finite;
+    if (!finite) return result;
+    std::partial_sum(first.begin(), first.end(), first.begin());
     result.edges.resize(first.back());
     std::atomic<std::size_t> at_border{0};
     for_each_leaf([&](std::size_t n, const Leaf& leaf, TreeReader& reader, LeafSigns& signs) {
@@ -181,7 +183,7 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
     for (std::size_t n = 0; n < count; ++n)
         if (first[n] < first[n + 1])
             result.parts.push_back({leaves.leaf(n).origin(), first[n], first[n + 1]});
-    result.cell_parts = std::accumulate(parts.begin(), parts.end(), 0L);
+    result.cell_parts = std::accumulate(cell_parts_of.begin(), cell_parts_of.end(), 0L);
     result.at_border = at_border;
     return result;
 }

@@ -53,7 +53,8 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, const Surface::Crossi
 
     const std::size_t columns = static_cast<std::size_t>(count_[0]) * count_[1];
     first_.assign(columns + 1, 0);
-    // Each goes to the next free place of its column, in any order: they are sorted then.
+    // Each goes to the next free place of its column, in any order: they are sorted then. To make them takes
+    // longer than anything else here, so they are held twice; a frame needs its most memory later.
     std::vector<Entry> made(crossings.size);
     std::vector<std::atomic<std::uint32_t>> next(columns);
     Directions directions;

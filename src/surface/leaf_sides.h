@@ -17,8 +17,9 @@ namespace isotrack {
 /// An accessor that its tree does not know of, and must outlive it.
 using TreeReader = openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>;
 
-/// Which nodes of leaves are inside, remembered of those asked for last: their values are read once, though
-/// the leaves around them ask as well. For one thread. Notices values that are not finite.
+/// Which nodes of leaves are inside, remembered of those asked for last: their values are mostly read once,
+/// though the leaves around them ask as well. For one thread, as long as the leaves neither change nor go;
+/// 150 kB. Notices values that are not finite.
 class LeafSigns {
 public:
     using Leaf = openvdb::FloatTree::LeafNodeType;
@@ -77,7 +78,7 @@ private:
     bool finite_ = true;
 };
 
-/// Of a leaf's nodes and those one beyond its upper ends.
+/// Which of a leaf's nodes, and of those one beyond its upper ends, are inside.
 class LeafSides {
 public:
     using Leaf = LeafSigns::Leaf;

@@ -574,7 +574,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     const Id first_new = next_id;
 
     place_particles(motion, *work);
-    {
+    {  // which frees what is of no use to a mesh that passes
         Making making(*this, *work);
         making.mesh_particles();
         making.certify();

@@ -11,7 +11,7 @@
 namespace isotrack {
 
 /// Crossings in columns along the third axis, sorted within each by where they are on it. The order depends
-/// on the crossings alone. Read-only, so threads may share it.
+/// on the crossings and the surface's bounds alone. Read-only, so threads may share it.
 class CrossingGrid {
 public:
     /// Those of `surface.crossing_sequence(apart)`.
@@ -23,7 +23,8 @@ public:
 
     std::size_t size() const { return entries_.size(); }
     bool empty() const { return entries_.empty(); }
-    /// Its point is exact to 1e-7 of the extent of them all.
+    /// Its point is exact to 1e-7 of the extent of the surface's bounds, or of them all where they came as a
+    /// list.
     Surface::Crossing operator[](std::size_t i) const {
         const Entry& e = entries_[i];
         return {origin_ + e.offset.cast<double>(), directions_[e.direction], static_cast<int>(e.stands_for),

@@ -74,7 +74,8 @@ public:
     /// around what is a few resolutions small. Distances near the surface are the values over it.
     virtual double slope() const { return 1.0; }
 
-    /// A box that holds the surface; empty when there is none.
+    /// A finite box that holds the surface and little more, since what looks up places is laid out over it;
+    /// empty when there is no surface.
     virtual Box bounds() const = 0;
 
     /// Whether a point of the surface is at the border of what is known, where the surface is closed by a
