@@ -100,9 +100,9 @@ public:
         std::function<Crossing(std::size_t)> at;  ///< Below `size`.
     };
     /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
-    /// in the same order. Of those within a cube of an edge of about `apart` some along one axis may stand for
-    /// all: one that goes out and one that goes in, where there are both; where the surface is a flat sheet,
-    /// four within a cube of about four times that. This default scans `bounds()` and gives all.
+    /// in the same order. Of those within a cube of an edge of about `apart` some along one axis may stand
+    /// for all: one that goes out and one that goes in, where there are both; where the surface is a flat
+    /// sheet, four within a cube of about four times that. This default scans `bounds()` and gives all.
     virtual CrossingSequence crossing_sequence(double apart) const;
     /// A list of them.
     std::vector<Crossing> crossings(double apart = 0.0) const;
