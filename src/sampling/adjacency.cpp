@@ -133,19 +133,30 @@ Adjacency Adjacency::squared() const {
     return result;
 }
 
-std::vector<std::vector<int>> colour_groups(const Adjacency& adjacency) {
+std::vector<std::vector<Block>> colour_groups(const Adjacency& adjacency, int longest) {
+    const int count = static_cast<int>(adjacency.size());
+    std::vector<Block> blocks;
+    for (int i = 0; i < count; ++i) {
+        bool goes_on = false;
+        if (i > 0 && i - blocks.back().begin < longest)
+            for (const int j : adjacency.of(i)) goes_on = goes_on || (j < i && j >= blocks.back().begin);
+        if (goes_on)
+            blocks.back().end = i + 1;
+        else
+            blocks.push_back({i, i + 1});
+    }
     std::vector<int> colour(adjacency.size(), -1);
-    std::vector<std::vector<int>> groups;
+    std::vector<std::vector<Block>> groups;
     std::vector<char> taken;
-    for (std::size_t i = 0; i < adjacency.size(); ++i) {
+    for (const Block& block : blocks) {
         taken.assign(groups.size() + 1, 0);
-        for (const int j : adjacency.of(i))
-            if (colour[j] >= 0) taken[colour[j]] = 1;
-        int c = 0;
-        while (taken[c]) ++c;
-        if (c == static_cast<int>(groups.size())) groups.emplace_back();
-        colour[i] = c;
-        groups[c].push_back(static_cast<int>(i));
+        for (int i = block.begin; i < block.end; ++i)
+            for (const int j : adjacency.of(i))
+                if (colour[j] >= 0) taken[colour[j]] = 1;
+        const auto free = std::find(taken.begin(), taken.end(), 0) - taken.begin();
+        if (free == static_cast<std::ptrdiff_t>(groups.size())) groups.emplace_back();
+        std::fill(colour.begin() + block.begin, colour.begin() + block.end, static_cast<int>(free));
+        groups[free].push_back(block);
     }
     return groups;
 }

@@ -10,8 +10,14 @@
 
 namespace isotrack {
 
+namespace {
+
+constexpr int kLongestBlock = 32;  // few enough that a group of blocks keeps all threads busy
+
+}  // namespace
+
 int relax(Particles& particles, const Adjacency& adjacency, const Surface& surface, int sweeps) {
-    const auto groups = colour_groups(adjacency);
+    const auto groups = colour_groups(adjacency, kLongestBlock);
     ThreadProbes probes(surface);
     std::vector<Metric> metrics;
     metrics.reserve(particles.size());
@@ -42,12 +48,11 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
                 });
         }
         for (const auto& group : groups)
-            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, group.size(), 16), [&](const auto& range) {
+            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, group.size()), [&](const auto& range) {
                 Surface::Probe& probe = probes.local();
-                for (std::size_t g = range.begin(); g < range.end(); ++g) {
-                    const int i = group[g];
-                    moved[i] = active[i] && step(i, probe);
-                }
+                for (std::size_t b = range.begin(); b < range.end(); ++b)
+                    for (int i = group[b].begin; i < group[b].end; ++i)
+                        moved[i] = active[i] && step(i, probe);
             });
     }
     return done;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "isotrack/sampling/cover.h"
@@ -22,20 +23,43 @@ using support::limits_of;
 using support::nearest_distance;
 using support::random_on_unit_sphere;
 
-TEST(ColourGroups, HoldEveryParticleOnceAndNoTwoNeighbours) {
+TEST(ColourGroups, HoldEveryParticleOnceAndNoNeighboursInTwoBlocks) {
     const Particles particles = random_on_unit_sphere(500, 0.15);
     const Adjacency adjacency = adjacency_of(particles);
-    std::vector<int> colour(particles.size(), -1);
-    const auto groups = colour_groups(adjacency);
-    for (std::size_t g = 0; g < groups.size(); ++g)
-        for (const int i : groups[g]) {
-            EXPECT_EQ(colour[i], -1);
-            colour[i] = static_cast<int>(g);
+    for (const int longest : {1, 3, 500}) {
+        std::vector<int> colour(particles.size(), -1), begin(particles.size());
+        const auto groups = colour_groups(adjacency, longest);
+        for (std::size_t g = 0; g < groups.size(); ++g)
+            for (const Block& block : groups[g]) {
+                ASSERT_LE(block.end - block.begin, longest);
+                for (int i = block.begin; i < block.end; ++i) {
+                    EXPECT_EQ(colour[i], -1);
+                    colour[i] = static_cast<int>(g);
+                    begin[i] = block.begin;
+                }
+            }
+        for (std::size_t i = 0; i < particles.size(); ++i) {
+            ASSERT_GE(colour[i], 0);
+            for (const int j : adjacency.of(i)) ASSERT_TRUE(begin[i] == begin[j] || colour[i] != colour[j]);
         }
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-        ASSERT_GE(colour[i], 0);
-        for (const int j : adjacency.of(i)) ASSERT_NE(colour[i], colour[j]);
     }
+}
+
+TEST(ColourGroups, HaveLongBlocksWhereNeighboursFollowEachOther) {
+    std::vector<std::pair<int, int>> pairs;  // two chains
+    for (const auto& [from, to] : {std::pair(0, 30), std::pair(30, 50)})
+        for (int i = from; i + 1 < to; ++i) {
+            pairs.emplace_back(i, i + 1);
+            pairs.emplace_back(i + 1, i);
+        }
+    const auto groups = colour_groups(from_pairs(pairs, 50), 20);
+    ASSERT_EQ(groups.size(), 2u);  // the two blocks of a chain differ
+    ASSERT_EQ(groups[0].size(), 2u);
+    ASSERT_EQ(groups[1].size(), 1u);
+    const auto spans = [](const Block& block, int begin, int end) {
+        return block.begin == begin && block.end == end;
+    };
+    EXPECT_TRUE(spans(groups[0][0], 0, 20) && spans(groups[1][0], 20, 30) && spans(groups[0][1], 30, 50));
 }
 
 TEST(Relax, SpreadsRandomPointsAndKeepsThemOnTheSurface) {
