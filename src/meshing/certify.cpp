@@ -8,9 +8,11 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "delaunay/circumcentre.h"
 #include "meshing/triangle_distance.h"
+#include "meshing/triangle_quadratic.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -20,8 +22,9 @@ namespace {
 /// surface itself always does.
 constexpr double kStandsFor = -0.2;
 
-constexpr int kFewestSteps = 3, kMostSteps = 6;
-constexpr double kSteep = 0.3;  // of the steepest a distance can be
+constexpr int kFewestSteps = TriangleQuadratic::kFewestSteps, kMostSteps = TriangleQuadratic::kMostSteps;
+constexpr double kSmooth = 0.05;  // of the error: residual of what is as good as a quadratic function
+constexpr double kSteep = 0.3;    // of the steepest a distance can be
 constexpr double kAlmost =
     1.4;  // times what is refined: a few points may have missed the larger of two maxima
 
@@ -53,35 +56,57 @@ struct Survey {
     double steepest = 0.0;
 };
 
+/// Looks for the farthest point to one side of the surface, from the farthest of a lattice. Where values are
+/// as good as a quadratic function and what it comes to does not matter, its peak alone is looked at.
+void refine(Surface::Probe& probe, const Vec3& a, const Vec3& ab, const Vec3& ac, int steps, double sign,
+            double refine_above, const std::optional<TriangleQuadratic>& quadratic, Sample& best) {
+    const double close = kSmooth * best.distance;
+    if (quadratic && quadratic->residual() < close) {
+        const TriangleQuadratic::Point peak = quadratic->peak(sign);
+        const double expected = sign * peak.value,
+                     distance = sign * probe.farther_value(a + peak.u * ab + peak.v * ac);
+        if (distance > best.distance) best = {peak.u, peak.v, distance};
+        if (std::abs(distance - expected) < close && best.distance < kAlmost * refine_above) return;
+    }
+    climb(probe, a, ab, ac, 0.5 / steps, sign, best);
+}
+
 Survey survey(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
               double refine_above) {
     Survey result;
     TriangleError& error = result.error;
-    int count = 0;
     Sample outside, inside;  // the farthest on either side
     const double along = steps / (c - a).norm(), across = steps / (b - a).norm();
-    thread_local std::vector<double> row, row_before;  // there are many triangles
-    row.resize(steps + 1);
-    row_before.resize(steps + 1);
+    thread_local std::vector<double> values;  // there are many triangles
+    values.clear();
     for (int i = 0; i <= steps; ++i) {
+        const std::size_t before = values.size() - (steps + 2 - i);  // the row
         for (int j = 0; i + j <= steps; ++j) {
             const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
-            const double value = row[j] = probe.farther_value(a + u * (b - a) + v * (c - a));
+            const double value = probe.farther_value(a + u * (b - a) + v * (c - a));
             error.mean_square += value * value;
-            ++count;
             if (value > outside.distance) outside = {u, v, value};
             if (-value > inside.distance) inside = {u, v, -value};
-            if (i > 0) result.steepest = std::max(result.steepest, std::abs(value - row_before[j]) * across);
-            if (j > 0) result.steepest = std::max(result.steepest, std::abs(value - row[j - 1]) * along);
+            if (i > 0)
+                result.steepest = std::max(result.steepest, std::abs(value - values[before + j]) * across);
+            if (j > 0) result.steepest = std::max(result.steepest, std::abs(value - values.back()) * along);
+            values.push_back(value);
         }
-        row.swap(row_before);
     }
-    if (outside.distance > refine_above) climb(probe, a, b - a, c - a, 0.5 / steps, 1.0, outside);
-    if (inside.distance > refine_above) climb(probe, a, b - a, c - a, 0.5 / steps, -1.0, inside);
+    std::optional<TriangleQuadratic> quadratic;
+    if (std::max(outside.distance, inside.distance) > refine_above && steps >= kFewestSteps &&
+        steps <= kMostSteps)
+        quadratic.emplace(values.data(), steps);
+    const auto refine_side = [&](double sign, Sample& farthest) {
+        if (farthest.distance > refine_above)
+            refine(probe, a, b - a, c - a, steps, sign, refine_above, quadratic, farthest);
+    };
+    refine_side(1.0, outside);
+    refine_side(-1.0, inside);
     const Sample& farthest = outside.distance > inside.distance ? outside : inside;
     error.largest = farthest.distance;
     error.where = a + farthest.u * (b - a) + farthest.v * (c - a);
-    error.mean_square /= count;
+    error.mean_square /= static_cast<double>(values.size());
     return result;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <utility>
 
 #include "isotrack/surface/shapes.h"
 
@@ -52,6 +53,38 @@ TEST_F(TwoBumps, AreToldApartWhereTheErrorIsLarge) {
 TEST_F(TwoBumps, AreToldApartWhereValuesChangeSteeply) {
     EXPECT_NEAR(found(1.0, 0.7).largest, 0.9, 1e-3);
     EXPECT_LT((found(1.0, 0.7).where - narrow).norm(), 0.05);
+}
+
+/// Counts what it is asked.
+class CountingProbe final : public Surface::Probe {
+public:
+    explicit CountingProbe(std::function<double(const Vec3&)> value)
+        : Probe(1e-4, 1.0), value_(std::move(value)) {}
+    double value(const Vec3& p) override {
+        ++count;
+        return value_(p);
+    }
+    Surface::Sample sample(const Vec3& p) override { return {value(p), Vec3::Zero()}; }
+    int count = 0;
+
+private:
+    std::function<double(const Vec3&)> value_;
+};
+
+TEST(TriangleError, IsFoundBetweenThePointsOfASmoothOneByOneMore) {
+    // Over a saddle, largest inside an edge.
+    const Vec3 a(0, 0, 0), b(3, 0, 0), c(0, 3, 0);
+    CountingProbe smooth(
+        [](const Vec3& p) { return 0.1 * (p.x() * (3.0 - p.x()) + 0.3 * p.y() * p.y() - p.y()); });
+    constexpr int kPoints = 10;
+    EXPECT_NEAR(triangle_error(a, b, c, smooth, 3, 0.18).largest, 0.1 * 1.5 * 1.5, 1e-9);
+    EXPECT_EQ(smooth.count, kPoints + 1);
+    // Where it comes to much, or there is a kink, it is followed.
+    smooth.count = 0;
+    EXPECT_NEAR(triangle_error(a, b, c, smooth, 3, 0.1).largest, 0.1 * 1.5 * 1.5, 2e-3);
+    EXPECT_GT(smooth.count, kPoints + 6);
+    CountingProbe kink([](const Vec3& p) { return 0.1 * (1.5 - std::abs(p.x() - 1.5)) - 0.02 * p.y(); });
+    EXPECT_NEAR(triangle_error(a, b, c, kink, 3, 0.095).largest, 0.15, 3e-3);
 }
 
 /// A triangle in the plane z = 0, about its middle, turned about the x axis.

@@ -20,8 +20,10 @@ struct TriangleError {
 };
 
 /// The error of triangle abc at the points of a regular barycentric lattice with `steps` intervals per edge
-/// (>= 1): (steps+1)(steps+2)/2 points. Where it is above `refine_above` on a side of the surface it is
-/// followed uphill between the points, to within two percent; the mean is that of the points.
+/// (>= 1): (steps+1)(steps+2)/2 points. Where it is above `refine_above` on a side of the surface it is also
+/// looked for between them: at the peak of the quadratic function through them, if there as at the points it
+/// is within 5 % of that and comes to less than 1.4 `refine_above`; else uphill, to within two percent. The
+/// mean is that of the points.
 TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
                              double refine_above = std::numeric_limits<double>::infinity());
 
