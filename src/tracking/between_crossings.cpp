@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 
@@ -11,7 +12,10 @@
 namespace isotrack {
 namespace {
 
-constexpr double kNearlyTooFar = 0.8, kNearlyAtFolds = 0.1;  // of the tolerance
+// Of a crossing whose surroundings are looked at: of the tolerance; or so many spacings less than it, as the
+// surface between them may be farther off. The larger counts.
+constexpr double kNearlyTooFar = 0.8, kNearlyAtFolds = 0.1;
+constexpr double kFarther = 0.1, kFartherAtFolds = 0.45;
 // Spacings: so far around lie those that a crossing stands for.
 constexpr double kStandsForWithin = 0.5, kStandsForOnFlat = 2.0;
 constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
@@ -63,6 +67,9 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
                                [&](std::size_t c) { at_fold[c].store(1, std::memory_order_relaxed); });
     });
     looked_at_.resize(crossings_.size(), 0);
+    const double room = crossings_.spacing();
+    const double nearly = std::max(kNearlyTooFar * tolerance_, tolerance_ - kFarther * room),
+                 nearly_at_folds = std::max(kNearlyAtFolds * tolerance_, tolerance_ - kFartherAtFolds * room);
     constexpr std::size_t kBlock = 32768;
     const auto doubtful = find_in_blocks<int>(
         crossings_.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
@@ -70,7 +77,7 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
                 const double d = at_crossings[c];
                 if (looked_at_[c] || d > kCertified * tolerance_) continue;
                 const bool fold = at_fold[c] && !crossings_[c].flat;
-                if (!(d > (fold ? kNearlyAtFolds : kNearlyTooFar) * tolerance_)) continue;
+                if (!(d > (fold ? nearly_at_folds : nearly))) continue;
                 looked_at_[c] = 1;
                 found.push_back(static_cast<int>(c));
             }
