@@ -117,12 +117,23 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
     return survey(a, b, c, probe, steps, refine_above).error;
 }
 
-double facing(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
-    const Vec3 normal = (b - a).cross(c - a).normalized();
-    double most = normal.dot(probe.normal((a + b + c) / 3.0));
+namespace {
+
+/// `facing` of a triangle with this normal, where the gradient at the centroid is known.
+double facing(const Vec3& normal, const Vec3& gradient, const Vec3& a, const Vec3& b, const Vec3& c,
+              Surface::Probe& probe) {
+    const double length = gradient.norm();
+    double most = length > 0.0 ? normal.dot(gradient) / length : 0.0;
     if (most >= kFacing) return most;
     for (const Vec3* corner : {&a, &b, &c}) most = std::max(most, normal.dot(probe.normal(*corner)));
     return most;
+}
+
+}  // namespace
+
+double facing(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
+    return facing((b - a).cross(c - a).normalized(), probe.sample((a + b + c) / 3.0).gradient, a, b, c,
+                  probe);
 }
 
 double turned_deg(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, double detail) {
@@ -131,10 +142,13 @@ double turned_deg(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& p
     constexpr double kDegrees = 57.29577951308232;
     const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
     const double least_area = kLeastHeight * detail * std::sqrt(longest2);
-    if (!((b - a).cross(c - a).norm() > least_area) ||
-        !(probe.sample((a + b + c) / 3.0).gradient.norm() > kLeastSlope))
-        return 0.0;
-    return kDegrees * std::acos(std::clamp(facing(a, b, c, probe), -1.0, 1.0));
+    const Vec3 normal = (b - a).cross(c - a);
+    const double area = normal.norm();
+    if (!(area > least_area)) return 0.0;
+    const Vec3 gradient = probe.sample((a + b + c) / 3.0).gradient;
+    if (!(gradient.norm() > kLeastSlope)) return 0.0;
+    const double cosine = facing(normal / area, gradient, a, b, c, probe);
+    return kDegrees * std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
 int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double detail) {

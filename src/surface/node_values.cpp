@@ -10,9 +10,11 @@ void NodeValues::fetch(const Coord& node, const Coord& at, Place& place) {
     place.leaf = at;
     if (const Leaf* found = leaves_.probeConstLeaf(node)) {
         place.values = found->buffer().data();
+    } else if (const float value = leaves_.getValue(node); value == far_[value < 0.0f][0]) {
+        place.values = far_[value < 0.0f];
     } else {
         if (!place.tile) place.tile = std::make_unique<float[]>(Leaf::SIZE);
-        std::fill_n(place.tile.get(), Leaf::SIZE, leaves_.getValue(node));
+        std::fill_n(place.tile.get(), Leaf::SIZE, value);
         place.values = place.tile.get();
     }
     std::fill_n(&place.beyond[0][0][0], 8, nullptr);

@@ -3,6 +3,7 @@
 
 #include <openvdb/openvdb.h>
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
 
@@ -15,7 +16,13 @@ class NodeValues {
     static constexpr int kLeafDim = Leaf::DIM, kMask = kLeafDim - 1;
 
 public:
-    explicit NodeValues(const openvdb::FloatTree& tree) : leaves_(tree) {}
+    explicit NodeValues(const openvdb::FloatTree& tree) : leaves_(tree) {
+        const float outside = tree.background();
+        std::fill_n(far_[0], Leaf::SIZE, outside);
+        std::fill_n(far_[1], Leaf::SIZE, -outside);
+    }
+    NodeValues(const NodeValues&) = delete;  // places point into it
+    NodeValues& operator=(const NodeValues&) = delete;
 
     float at(const Coord& node) {
         return place_of(node).values[offset(node.x() & kMask, node.y() & kMask) + (node.z() & kMask)];
@@ -56,9 +63,10 @@ public:
 private:
     struct Place {
         const float* values = nullptr;
-        Coord leaf;                               // in leaves
-        const float* beyond[2][2][2] = {};        // of the next leaves along the axes, once they were met
-        std::unique_ptr<float[]> tile = nullptr;  // as many values as a leaf has, all the same
+        Coord leaf;                         // in leaves
+        const float* beyond[2][2][2] = {};  // of the next leaves along the axes, once they were met
+        std::unique_ptr<float[]> tile =
+            nullptr;  // of one with another value than most, as many as a leaf has
     };
 
     /// The place of the leaf that holds a node, or would.
@@ -75,6 +83,7 @@ private:
 
     openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> leaves_;  // one thread's, not registered
     Place places_[64];
+    float far_[2][Leaf::SIZE];  // of most tiles, outside and inside
 };
 
 }  // namespace isotrack
