@@ -12,7 +12,7 @@ namespace isotrack {
 
 namespace {
 
-constexpr int kLongestBlock = 32;  // few enough that a group of blocks keeps all threads busy
+constexpr int kLongestBlock = 16;  // few enough that a group of blocks keeps all threads busy
 
 }  // namespace
 
