@@ -80,16 +80,18 @@ Survey survey(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe
     thread_local std::vector<double> values;  // there are many triangles
     values.clear();
     for (int i = 0; i <= steps; ++i) {
-        const std::size_t before = values.size() - (steps + 2 - i);  // the row
+        const std::size_t row_before = steps + 2 - i;  // its length: so far back is what is next to a value
         for (int j = 0; i + j <= steps; ++j) {
             const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
             const double value = probe.farther_value(a + u * (b - a) + v * (c - a));
             error.mean_square += value * value;
             if (value > outside.distance) outside = {u, v, value};
             if (-value > inside.distance) inside = {u, v, -value};
-            if (i > 0)
-                result.steepest = std::max(result.steepest, std::abs(value - values[before + j]) * across);
-            if (j > 0) result.steepest = std::max(result.steepest, std::abs(value - values.back()) * along);
+            const auto change_from = [&](std::size_t back) {
+                return std::abs(value - values[values.size() - back]);
+            };
+            if (i > 0) result.steepest = std::max(result.steepest, change_from(row_before) * across);
+            if (j > 0) result.steepest = std::max(result.steepest, change_from(1) * along);
             values.push_back(value);
         }
     }

@@ -65,8 +65,7 @@ private:
         const float* values = nullptr;
         Coord leaf;                         // in leaves
         const float* beyond[2][2][2] = {};  // of the next leaves along the axes, once they were met
-        std::unique_ptr<float[]> tile =
-            nullptr;  // of one with another value than most, as many as a leaf has
+        std::unique_ptr<float[]> tile;      // as many values as a leaf has, where far_ has none like them
     };
 
     /// The place of the leaf that holds a node, or would.
@@ -83,7 +82,7 @@ private:
 
     openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> leaves_;  // one thread's, not registered
     Place places_[64];
-    float far_[2][Leaf::SIZE];  // of most tiles, outside and inside
+    float far_[2][Leaf::SIZE];  // values of most tiles, outside and inside
 };
 
 }  // namespace isotrack
