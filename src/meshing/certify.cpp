@@ -56,8 +56,9 @@ struct Survey {
     double steepest = 0.0;
 };
 
-/// Looks for the farthest point to one side of the surface, from the farthest of a lattice. Where values are
-/// as good as a quadratic function and what it comes to does not matter, its peak alone is looked at.
+/// Looks for the farthest point to one side of the surface, from the farthest of a lattice: first at the peak
+/// of a quadratic function where that is as good as the values, and uphill unless it is so there, too, and
+/// stays below kAlmost `refine_above`.
 void refine(Surface::Probe& probe, const Vec3& a, const Vec3& ab, const Vec3& ac, int steps, double sign,
             double refine_above, const std::optional<TriangleQuadratic>& quadratic, Sample& best) {
     const double close = kSmooth * best.distance;
@@ -121,9 +122,9 @@ TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfac
 
 namespace {
 
-/// `facing` of a triangle with this normal, where the gradient at the centroid is known.
-double facing(const Vec3& normal, const Vec3& gradient, const Vec3& a, const Vec3& b, const Vec3& c,
-              Surface::Probe& probe) {
+/// `facing` of a triangle with this unit normal, where the gradient at the centroid is known.
+double best_facing(const Vec3& normal, const Vec3& gradient, const Vec3& a, const Vec3& b, const Vec3& c,
+                   Surface::Probe& probe) {
     const double length = gradient.norm();
     double most = length > 0.0 ? normal.dot(gradient) / length : 0.0;
     if (most >= kFacing) return most;
@@ -134,8 +135,8 @@ double facing(const Vec3& normal, const Vec3& gradient, const Vec3& a, const Vec
 }  // namespace
 
 double facing(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
-    return facing((b - a).cross(c - a).normalized(), probe.sample((a + b + c) / 3.0).gradient, a, b, c,
-                  probe);
+    return best_facing((b - a).cross(c - a).normalized(), probe.sample((a + b + c) / 3.0).gradient, a, b, c,
+                       probe);
 }
 
 double turned_deg(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, double detail) {
@@ -143,13 +144,13 @@ double turned_deg(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& p
     constexpr double kLeastSlope = 0.6;
     constexpr double kDegrees = 57.29577951308232;
     const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-    const double least_area = kLeastHeight * detail * std::sqrt(longest2);
+    const double least = kLeastHeight * detail * std::sqrt(longest2);
     const Vec3 normal = (b - a).cross(c - a);
-    const double area = normal.norm();
-    if (!(area > least_area)) return 0.0;
+    const double twice_area = normal.norm();
+    if (!(twice_area > least)) return 0.0;
     const Vec3 gradient = probe.sample((a + b + c) / 3.0).gradient;
     if (!(gradient.norm() > kLeastSlope)) return 0.0;
-    const double cosine = facing(normal / area, gradient, a, b, c, probe);
+    const double cosine = best_facing(normal / twice_area, gradient, a, b, c, probe);
     return kDegrees * std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 

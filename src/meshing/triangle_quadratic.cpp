@@ -1,8 +1,8 @@
 #include "meshing/triangle_quadratic.h"
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 
 namespace isotrack {
@@ -31,6 +31,8 @@ struct LatticeFit {
 };
 
 const LatticeFit& lattice_fit(int steps) {
+    static_assert(TriangleQuadratic::kFewestSteps == 3 && TriangleQuadratic::kMostSteps == 6);
+    assert(steps >= TriangleQuadratic::kFewestSteps && steps <= TriangleQuadratic::kMostSteps);
     static const std::array<LatticeFit, 4> all{LatticeFit(3), LatticeFit(4), LatticeFit(5), LatticeFit(6)};
     return all[steps - TriangleQuadratic::kFewestSteps];
 }
@@ -40,14 +42,17 @@ const LatticeFit& lattice_fit(int steps) {
 TriangleQuadratic::TriangleQuadratic(const double* values, int steps) : k_(Terms::Zero()) {
     const LatticeFit& fit = lattice_fit(steps);
     for (int p = 0; p < fit.points; ++p) k_ += values[p] * fit.share[p];
-    for (int p = 0; p < fit.points; ++p)
-        residual_ = std::max(residual_, std::abs(k_.dot(fit.terms[p]) - values[p]));
+    for (int p = 0; p < fit.points; ++p) {
+        const double off = std::abs(k_.dot(fit.terms[p]) - values[p]);
+        if (!(off <= residual_)) residual_ = off;
+    }
 }
 
 TriangleQuadratic::Point TriangleQuadratic::peak(double sign) const {
     Point best{0.0, 0.0, k_[0]};
     const auto try_at = [&](double u, double v) {
-        constexpr double kRounded = 1.0 + 1e-12;
+        constexpr double kRounded = 1.0 + 1e-12;  // on the third edge
+        // Where q is nowhere level, or everywhere, these are no numbers.
         if (!(u >= 0.0 && v >= 0.0 && u + v <= kRounded)) return;
         const double value = at(u, v);
         if (sign * value > sign * best.value) best = {u, v, value};

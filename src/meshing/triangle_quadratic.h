@@ -15,13 +15,14 @@ public:
     /// to kMostSteps.
     TriangleQuadratic(const double* values, int steps);
 
-    /// How far it is from the values at most.
+    /// How far it is from the values at most; not a number where one of them is none.
     double residual() const { return residual_; }
 
     struct Point {
         double u, v, value;
     };
-    /// Where `sign` q is largest inside the triangle or inside an edge; a corner where it is nowhere.
+    /// Of the places inside the triangle and inside its edges where q is level, the one where `sign` q is
+    /// largest; the first corner where that has more. The corners are among the values anyway.
     Point peak(double sign) const;
 
 private:

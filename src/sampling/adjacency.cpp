@@ -133,22 +133,23 @@ Adjacency Adjacency::squared() const {
     return result;
 }
 
-std::vector<std::vector<Block>> colour_groups(const Adjacency& adjacency, int longest) {
+std::vector<std::vector<ParticleBlock>> colour_groups(const Adjacency& adjacency, int longest) {
     const int count = static_cast<int>(adjacency.size());
-    std::vector<Block> blocks;
+    std::vector<ParticleBlock> blocks;
     for (int i = 0; i < count; ++i) {
-        bool goes_on = false;
-        if (i > 0 && i - blocks.back().begin < longest)
-            for (const int j : adjacency.of(i)) goes_on = goes_on || (j < i && j >= blocks.back().begin);
+        const Adjacency::Range near = adjacency.of(i);
+        const bool goes_on =
+            i > 0 && i - blocks.back().begin < longest &&
+            std::any_of(near.begin(), near.end(), [&](int j) { return j < i && j >= blocks.back().begin; });
         if (goes_on)
             blocks.back().end = i + 1;
         else
             blocks.push_back({i, i + 1});
     }
     std::vector<int> colour(adjacency.size(), -1);
-    std::vector<std::vector<Block>> groups;
+    std::vector<std::vector<ParticleBlock>> groups;
     std::vector<char> taken;
-    for (const Block& block : blocks) {
+    for (const ParticleBlock& block : blocks) {
         taken.assign(groups.size() + 1, 0);
         for (int i = block.begin; i < block.end; ++i)
             for (const int j : adjacency.of(i))

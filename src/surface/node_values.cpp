@@ -23,7 +23,7 @@ void NodeValues::fetch(const Coord& node, const Coord& at, Place& place) {
 
 const float* NodeValues::meet(const float*& known, const Coord& node) {
     const Place& place = place_of(node);
-    if (place.values != place.tile.get()) known = place.values;  // those of tiles do not stay
+    if (place.values != place.tile.get()) known = place.values;  // its own tile is written over
     return place.values;
 }
 

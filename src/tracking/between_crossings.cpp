@@ -12,8 +12,9 @@
 namespace isotrack {
 namespace {
 
-// Of a crossing whose surroundings are looked at: of the tolerance; or so many spacings less than it, as the
-// surface between them may be farther off. The larger counts.
+// Of a crossing whose surroundings are looked at: of the tolerance; or so many spacings of the crossings less
+// than it, as the surface between them may be farther off. The larger counts. Where the spacing grows with
+// the tolerance, from a voxel on, that is 0.9 and 0.55 of it; where it does not, nothing is in doubt at last.
 constexpr double kNearlyTooFar = 0.8, kNearlyAtFolds = 0.1;
 constexpr double kFarther = 0.1, kFartherAtFolds = 0.45;
 // Spacings: so far around lie those that a crossing stands for.
@@ -67,9 +68,10 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
                                [&](std::size_t c) { at_fold[c].store(1, std::memory_order_relaxed); });
     });
     looked_at_.resize(crossings_.size(), 0);
-    const double room = crossings_.spacing();
-    const double nearly = std::max(kNearlyTooFar * tolerance_, tolerance_ - kFarther * room),
-                 nearly_at_folds = std::max(kNearlyAtFolds * tolerance_, tolerance_ - kFartherAtFolds * room);
+    const double spacing = crossings_.spacing();
+    const double nearly = std::max(kNearlyTooFar * tolerance_, tolerance_ - kFarther * spacing),
+                 nearly_at_folds =
+                     std::max(kNearlyAtFolds * tolerance_, tolerance_ - kFartherAtFolds * spacing);
     constexpr std::size_t kBlock = 32768;
     const auto doubtful = find_in_blocks<int>(
         crossings_.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {

@@ -30,7 +30,7 @@ TEST(ColourGroups, HoldEveryParticleOnceAndNoNeighboursInTwoBlocks) {
         std::vector<int> colour(particles.size(), -1), begin(particles.size());
         const auto groups = colour_groups(adjacency, longest);
         for (std::size_t g = 0; g < groups.size(); ++g)
-            for (const Block& block : groups[g]) {
+            for (const ParticleBlock& block : groups[g]) {
                 ASSERT_LE(block.end - block.begin, longest);
                 for (int i = block.begin; i < block.end; ++i) {
                     EXPECT_EQ(colour[i], -1);
@@ -56,7 +56,7 @@ TEST(ColourGroups, HaveLongBlocksWhereNeighboursFollowEachOther) {
     ASSERT_EQ(groups.size(), 2u);  // the two blocks of a chain differ
     ASSERT_EQ(groups[0].size(), 2u);
     ASSERT_EQ(groups[1].size(), 1u);
-    const auto spans = [](const Block& block, int begin, int end) {
+    const auto spans = [](const ParticleBlock& block, int begin, int end) {
         return block.begin == begin && block.end == end;
     };
     EXPECT_TRUE(spans(groups[0][0], 0, 20) && spans(groups[1][0], 20, 30) && spans(groups[0][1], 30, 50));

@@ -13,17 +13,17 @@ namespace isotrack {
 
 /// How far a triangle is from the surface. World units.
 struct TriangleError {
-    double largest = 0.0;  ///< Of |farther value| at the sample points.
+    double largest = 0.0;  ///< Of |farther value| at the points looked at.
     double mean_square = 0.0;
-    Vec3 where = Vec3::Zero();  ///< The sample point with the largest.
+    Vec3 where = Vec3::Zero();  ///< The point with the largest.
     double turned_deg = 0.0;    ///< `turned_deg`, where it is asked for.
 };
 
 /// The error of triangle abc at the points of a regular barycentric lattice with `steps` intervals per edge
 /// (>= 1): (steps+1)(steps+2)/2 points. Where it is above `refine_above` on a side of the surface it is also
-/// looked for between them: at the peak of the quadratic function through them, if there as at the points it
-/// is within 5 % of that and comes to less than 1.4 `refine_above`; else uphill, to within two percent. The
-/// mean is that of the points.
+/// looked for between them. With 3 to 6 steps, if the values are those of a quadratic function to within 5 %
+/// of the largest on that side: at that function's peak. Where the value is another there, or at least 1.4
+/// `refine_above`, and with other steps: uphill, to within two percent. The mean is that of the points.
 TriangleError triangle_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
                              double refine_above = std::numeric_limits<double>::infinity());
 

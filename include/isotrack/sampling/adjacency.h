@@ -39,13 +39,14 @@ Adjacency from_pairs(const std::vector<std::pair<int, int>>& pairs, std::size_t 
 Adjacency ring_of(const std::vector<std::array<int, 3>>& triangles, std::size_t count);
 
 /// Particles with numbers in a row.
-struct Block {
+struct ParticleBlock {
     int begin, end;
 };
-/// Blocks of particles, each the neighbour of one before it and at most `longest` of them, in the groups of a
-/// colouring: none has a neighbour in another block of its group, so that the blocks of a group can be
-/// treated at the same time. Particles that are next to each other in memory as in space make long blocks,
-/// which know what they read. Greedy in the order of the particles: the same at any thread count.
-std::vector<std::vector<Block>> colour_groups(const Adjacency& adjacency, int longest);
+/// Blocks of particles, of which all but the first are a neighbour of one before, at most `longest` (>= 1) in
+/// each, in the groups of a colouring: none has a neighbour in another block of its group, so that the blocks
+/// of a group can be treated at the same time. Particles that are next to each other in memory as in space
+/// make long blocks, whose neighbours are still in the caches. Greedy in the order of the particles: the same
+/// at any thread count.
+std::vector<std::vector<ParticleBlock>> colour_groups(const Adjacency& adjacency, int longest);
 
 }  // namespace isotrack
