@@ -1,6 +1,10 @@
 // Faces of lattice cells whose two inside nodes are across a diagonal: which two nodes hang together.
 #pragma once
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -25,10 +29,17 @@ bool joins_diagonal(const Inside& inside) {
 
 /// The corners of a cell that are inside: bit 4 i + 2 j + k.
 inline unsigned inside_corners(const float (&v)[2][2][2]) {
+#ifdef __SSE2__  // the same in a quarter of the instructions: every value asked for needs it
+    const auto inside_of = [](const float* four) {
+        return static_cast<unsigned>(_mm_movemask_ps(_mm_cmplt_ps(_mm_loadu_ps(four), _mm_setzero_ps())));
+    };
+    return inside_of(v[0][0]) | inside_of(v[1][0]) << 4;
+#else
     unsigned inside = 0;
     for (unsigned c = 0; c < 8; ++c)
         inside |= static_cast<unsigned>(v[c >> 2][c >> 1 & 1][c & 1] < 0.0f) << c;
     return inside;
+#endif
 }
 
 /// The ambiguous faces of a cell by its corners that are inside: bit 2 axis + side.
