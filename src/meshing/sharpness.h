@@ -17,4 +17,11 @@ inline double sharpness(const Vec3& p, const Vec3& q, const Vec3& r) {
     return std::max({-u.dot(w), -v.dot(u), -w.dot(v)}) / u.cross(v).norm();
 }
 
+/// Whether a triangle is sharper than that (> 0), for less.
+inline bool is_sharper(double sharpness, const Vec3& p, const Vec3& q, const Vec3& r) {
+    const Vec3 u = q - p, v = r - q, w = p - r;
+    const double most = std::max({-u.dot(w), -v.dot(u), -w.dot(v)});
+    return !(most * most <= sharpness * sharpness * u.cross(v).squaredNorm());
+}
+
 }  // namespace isotrack

@@ -10,7 +10,7 @@
 namespace isotrack {
 namespace {
 
-constexpr int kFitSteps = 6;
+constexpr int kFitSteps = 9;
 
 }  // namespace
 

@@ -123,6 +123,41 @@ TEST(Fit, LeavesNoTriangleSharperThanItMay) {
     EXPECT_GT(moved, 50);
 }
 
+/// A bump in a hexagonal grid over a flat surface. The vertices on the border are to stay.
+struct Bump {
+    static constexpr int kSize = 9;
+    TriangleMesh mesh;
+    std::vector<char> movable;
+    shapes::SurfacePtr ground = shapes::from_function([](const Vec3& p) { return p.z(); },
+                                                      Box(Vec3(-1, -1, -1), Vec3(10, 10, 1)), 0.1);
+    explicit Bump(double height) {
+        for (int i = 0; i < kSize; ++i)
+            for (int j = 0; j < kSize; ++j) {
+                const bool inner = i > 0 && j > 0 && i + 1 < kSize && j + 1 < kSize;
+                movable.push_back(inner);
+                mesh.points.emplace_back(i + 0.5 * j, std::sqrt(0.75) * j, inner ? height : 0.0);
+            }
+        const auto at = [](int i, int j) { return i * kSize + j; };
+        for (int i = 0; i + 1 < kSize; ++i)
+            for (int j = 0; j + 1 < kSize; ++j)
+                mesh.triangles.insert(mesh.triangles.end(), {{at(i, j), at(i + 1, j), at(i, j + 1)},
+                                                             {at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)}});
+    }
+};
+
+TEST(Fit, NeedsNoNewValuesWhileFacetsMoveInParallelToTheSurface) {
+    Bump once(1e-4), again(1e-4);  // so low that facets do not turn
+    fit(once.mesh.points, once.mesh.triangles, *once.ground, 5, once.movable);
+    for (int step = 0; step < 5; ++step)
+        fit(again.mesh.points, again.mesh.triangles, *again.ground, 1, again.movable);
+    double highest = 0.0;
+    for (std::size_t v = 0; v < once.mesh.points.size(); ++v) {
+        EXPECT_LT((once.mesh.points[v] - again.mesh.points[v]).norm(), 1e-7);
+        highest = std::max(highest, std::abs(once.mesh.points[v].z()));
+    }
+    EXPECT_LT(highest, 0.3e-4);  // and they did move
+}
+
 TEST(Fit, GivesTheSameBitsAtAnyThreadCount) {
     const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
     const TriangleMesh mesh = support::icosphere(3);

@@ -1,0 +1,53 @@
+// The surface's values on one facet, at the points that a fit and its flips go by.
+#pragma once
+
+#include <array>
+
+#include "isotrack/surface/surface.h"
+#include "isotrack/types.h"
+
+namespace isotrack {
+
+struct FacetValues {
+    static constexpr int kSteps = 3;  ///< Per edge, of the barycentric lattice that the points are.
+    static constexpr int kPoints = (kSteps + 1) * (kSteps + 2) / 2;
+
+    Vec3 normal = Vec3::Zero();  ///< Unit; zero without area, as all else then.
+    double area2 = 0.0;          ///< Twice the area.
+    std::array<double, kPoints> value{};
+
+    /// The barycentric coordinates of the points.
+    static constexpr std::array<std::array<double, 3>, kPoints> kPlace = [] {
+        std::array<std::array<double, 3>, kPoints> place{};
+        int n = 0;
+        for (int i = 0; i <= kSteps; ++i)
+            for (int j = 0; i + j <= kSteps; ++j, ++n) {
+                place[n][1] = i / double{kSteps};
+                place[n][2] = j / double{kSteps};
+                place[n][0] = (kSteps - i - j) / double{kSteps};
+            }
+        return place;
+    }();
+
+    FacetValues() = default;
+    FacetValues(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
+        const Vec3 cross = (b - a).cross(c - a);
+        const double length = cross.norm();
+        if (!(length > 0.0)) return;
+        area2 = length;
+        normal = cross / length;
+        for (int n = 0; n < kPoints; ++n) {
+            const auto& [u, v, w] = kPlace[n];
+            value[n] = probe.value(u * a + v * b + w * c);
+        }
+    }
+
+    /// Twice the area times the mean square.
+    double error() const {
+        double sum = 0.0;
+        for (const double x : value) sum += x * x;
+        return area2 * sum / kPoints;
+    }
+};
+
+}  // namespace isotrack

@@ -1,0 +1,185 @@
+#include "meshing/fit_steps.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <limits>
+
+#include "meshing/corners.h"
+#include "meshing/sharpness.h"
+#include "surface/thread_probes.h"
+
+namespace isotrack {
+namespace {
+
+// The points of the closed Newton-Cotes rule of degree 3 over a triangle, whose weights 54, 9 and 4 are exact
+// for the parabola that a curved surface makes under a facet. Corners and edges count more here, where a
+// fitted mesh is farthest from its surface: that lowers the largest error. Much more would cost the right
+// volume.
+constexpr std::array<double, FacetValues::kPoints> kWeight = [] {
+    constexpr double kByZeros[3] = {54.0, 12.0, 7.0};  // in the middle, on an edge, in a corner
+    std::array<double, FacetValues::kPoints> weight{};
+    for (int n = 0; n < FacetValues::kPoints; ++n) {
+        int zeros = 0;
+        for (const double u : FacetValues::kPlace[n]) zeros += u == 0.0;
+        weight[n] = kByZeros[zeros];
+    }
+    return weight;
+}();
+
+/// Moments of these weights: of two corners' barycentric coordinates, and of one's.
+struct Moments {
+    double same = 0.0, different = 0.0, one = 0.0;
+};
+constexpr Moments kMoments = [] {
+    Moments m;
+    for (int n = 0; n < FacetValues::kPoints; ++n) {
+        const auto& u = FacetValues::kPlace[n];
+        m.same += kWeight[n] * u[0] * u[0];
+        m.different += kWeight[n] * u[0] * u[1];
+        m.one += kWeight[n] * u[0];
+    }
+    return m;
+}();
+
+constexpr double kRelaxation = 1.5;   // the shares of the neighbours make each step too short
+constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
+constexpr int kHalvings = 2;          // of the steps around a spoilt triangle, before they are taken back
+constexpr double kSmooth = 0.9;  // cosine between the facets around a vertex and their mean: less is a crease
+constexpr std::size_t kVertexGrain = 256, kTriangleGrain = 64;
+
+/// A triangle's share in the normal equations of its corners.
+struct Share {
+    Vec3 normal;
+    double area2;
+    std::array<double, 3> pull{};  ///< The integrals of the value times a corner's barycentric coordinate.
+
+    explicit Share(const FacetValues& facet) : normal(facet.normal), area2(facet.area2) {
+        for (int n = 0; n < FacetValues::kPoints; ++n)
+            for (int k = 0; k < 3; ++k)
+                pull[k] += area2 * kWeight[n] * FacetValues::kPlace[n][k] * facet.value[n];
+    }
+    /// After its corners moved along the normal by `way`.
+    void move(const std::array<double, 3>& way) {
+        const double sum = way[0] + way[1] + way[2];
+        for (int k = 0; k < 3; ++k)
+            pull[k] += area2 * (kMoments.same * way[k] + kMoments.different * (sum - way[k]));
+    }
+};
+
+/// Whether a triangle turns over by these steps, or gets too sharp and sharper than it was.
+bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const Vec3& b_to,
+            const Vec3& c_to) {
+    // What has no sharp angle after steps of a tenth of its edges has not turned over.
+    if (!is_sharper(kSharpnessAt30Degrees, a_to, b_to, c_to)) return false;
+    const Vec3 area = (b - a).cross(c - a);
+    if (area == Vec3::Zero()) return false;
+    if (!(area.dot((b_to - a_to).cross(c_to - a_to)) > 0.0)) return true;
+    return sharpness(a_to, b_to, c_to) > sharpness(a, b, c);
+}
+
+template <typename Body>
+void for_each(std::size_t count, std::size_t grain, const Body& body) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
+    });
+}
+
+/// Shortens the steps around triangles that they spoil, and takes them back where that is not enough.
+void undo_spoilt(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+                 const Corners& corners, const std::vector<int>& moving, std::vector<Vec3>& to) {
+    std::vector<char> bad(triangles.size(), 0), back(vertices.size(), 1);
+    for (int pass = 0;; ++pass) {
+        std::atomic<bool> any = false;
+        for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
+            const auto& [i, j, k] = triangles[t];
+            if (!back[i] && !back[j] && !back[k]) return;  // it was good, or no corner of it may move
+            bad[t] = spoilt(vertices[i], vertices[j], vertices[k], to[i], to[j], to[k]);
+            if (bad[t]) any.store(true, std::memory_order_relaxed);
+        });
+        if (!any) return;
+        if (pass == 0) std::fill(back.begin(), back.end(), 0);
+        for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
+            const int v = moving[m];
+            back[v] = 0;
+            for (int e = corners.first[v]; e < corners.first[v + 1] && !back[v]; ++e)
+                back[v] = bad[corners.corner[e] / 3];
+            if (back[v]) to[v] = pass < kHalvings ? Vec3(0.5 * (vertices[v] + to[v])) : vertices[v];
+        });
+    }
+}
+
+}  // namespace
+
+bool any_moves(const Triangle& t, const std::vector<char>& movable) {
+    return movable[t[0]] || movable[t[1]] || movable[t[2]];
+}
+
+void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& all_triangles,
+               const std::vector<FacetValues>& facets, const Surface& surface, int steps,
+               const std::vector<char>& movable, double damping) {
+    std::vector<Triangle> triangles;
+    std::vector<Share> shares;
+    std::vector<int> moving;
+    for (std::size_t t = 0; t < all_triangles.size(); ++t)
+        if (any_moves(all_triangles[t], movable)) {
+            triangles.push_back(all_triangles[t]);
+            shares.emplace_back(facets[t]);
+        }
+    for (std::size_t v = 0; v < vertices.size(); ++v)
+        if (movable[v]) moving.push_back(static_cast<int>(v));
+    const Corners corners(vertices.size(), triangles);
+
+    std::vector<Mat3> inverse(moving.size());  // of the quadrics, zero without one
+    std::vector<char> creased(vertices.size(), 0);
+    for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
+        const int v = moving[m];
+        Mat3 quadric = Mat3::Zero();
+        Vec3 sum = Vec3::Zero();
+        for (int e = corners.first[v]; e < corners.first[v + 1]; ++e) {
+            const Share& s = shares[corners.corner[e] / 3];
+            quadric += s.area2 * kMoments.one * s.normal * s.normal.transpose();
+            sum += s.normal;
+        }
+        for (int e = corners.first[v]; e < corners.first[v + 1]; ++e)
+            if (shares[corners.corner[e] / 3].normal.dot(sum) < kSmooth * sum.norm()) creased[v] = 1;
+        const double trace = quadric.trace();
+        quadric.diagonal().array() += damping * trace;
+        inverse[m] = trace > 0.0 ? Mat3(quadric.inverse()) : Mat3(Mat3::Zero());
+    });
+    std::vector<Vec3> to = vertices;
+    ThreadProbes probes(surface);
+    for (int step = 0; step < steps; ++step) {
+        for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
+            const int v = moving[m];
+            Vec3 pull = Vec3::Zero();
+            double shortest2 = std::numeric_limits<double>::infinity();
+            for (int e = corners.first[v]; e < corners.first[v + 1]; ++e) {
+                const int t = corners.corner[e] / 3, k = corners.corner[e] % 3;
+                pull += shares[t].pull[k] * shares[t].normal;
+                for (const int other : {triangles[t][(k + 1) % 3], triangles[t][(k + 2) % 3]})
+                    shortest2 = std::min(shortest2, (vertices[other] - vertices[v]).squaredNorm());
+            }
+            Vec3 move = -kRelaxation * (inverse[m] * pull);
+            const double length = move.norm(), limit = kLargestStep * std::sqrt(shortest2);
+            if (length > limit) move *= limit / length;
+            to[v] = vertices[v] + move;
+        });
+        undo_spoilt(vertices, triangles, corners, moving, to);
+        for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
+            const auto& [i, j, k] = triangles[t];
+            const auto way = [&](int v) { return shares[t].normal.dot(to[v] - vertices[v]); };
+            if (!creased[i] && !creased[j] && !creased[k])
+                shares[t].move({way(i), way(j), way(k)});
+            else if (step + 1 < steps)
+                shares[t] = Share({to[i], to[j], to[k], probes.local()});
+        });
+        for (const int v : moving) vertices[v] = to[v];
+    }
+}
+
+}  // namespace isotrack

@@ -1,0 +1,58 @@
+// The surface's values on one facet.
+#include "meshing/facet_values.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "isotrack/surface/shapes.h"
+#include "meshing/sharpness.h"
+
+namespace isotrack {
+namespace {
+
+TEST(FacetValues, AreThoseOfTheSurfaceAtItsPlaces) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const auto probe = sphere->probe();
+    const Vec3 a(1, 0, 0), b(0.8, 0.5, 0), c(0.8, 0.1, 0.6);
+    const FacetValues facet(a, b, c, *probe);
+    EXPECT_NEAR(facet.area2, (b - a).cross(c - a).norm(), 1e-15);
+    EXPECT_NEAR((facet.normal * facet.area2 - (b - a).cross(c - a)).norm(), 0.0, 1e-15);
+    double squares = 0.0;
+    for (int n = 0; n < FacetValues::kPoints; ++n) {
+        const auto& [u, v, w] = FacetValues::kPlace[n];
+        EXPECT_NEAR(u + v + w, 1.0, 1e-15);
+        const double distance = (u * a + v * b + w * c).norm() - 1.0;
+        EXPECT_NEAR(facet.value[n], distance, 1e-14);
+        squares += distance * distance;
+    }
+    EXPECT_NEAR(facet.error(), facet.area2 * squares / FacetValues::kPoints, 1e-14);
+}
+
+TEST(FacetValues, OfAFacetWithoutAreaAreNone) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const FacetValues facet({2, 0, 0}, {3, 0, 0}, {4, 0, 0}, *sphere->probe());
+    EXPECT_EQ(facet.normal, Vec3::Zero());
+    EXPECT_EQ(facet.error(), 0.0);
+}
+
+TEST(Sharpness, IsAskedForAsItIsCalculated) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> coordinate(-1.0, 1.0);
+    const auto point = [&] { return Vec3(coordinate(random), coordinate(random), coordinate(random)); };
+    int sharper = 0;
+    for (int i = 0; i < 1000; ++i) {
+        const Vec3 a = point(), b = point(), c = point();
+        const bool is = sharpness(a, b, c) > kSharpnessAt30Degrees;
+        EXPECT_EQ(is_sharper(kSharpnessAt30Degrees, a, b, c), is);
+        sharper += is;
+    }
+    EXPECT_GT(sharper, 100);
+    EXPECT_LT(sharper, 900);
+    EXPECT_FALSE(is_sharper(kSharpnessAt30Degrees, {0, 0, 0}, {1, 0, 0}, {0.5, 0.8, 0}));
+    EXPECT_TRUE(is_sharper(kSharpnessAt30Degrees, {0, 0, 0}, {1, 0, 0}, {2, 0, 0}));
+}
+
+}  // namespace
+}  // namespace isotrack
