@@ -3,12 +3,15 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
-#include <utility>
+#include <optional>
 
+#include "find_in_blocks.h"
 #include "isotrack/meshing/certify.h"
-#include "isotrack/meshing/fit.h"
 #include "meshing/corners.h"
+#include "meshing/facet_values.h"
+#include "meshing/fit_steps.h"
 #include "meshing/sharpness.h"
 #include "surface/thread_probes.h"
 
@@ -16,17 +19,17 @@ namespace isotrack {
 namespace {
 
 constexpr int kRounds = 2;
-constexpr int kFitSteps = 3;
+constexpr int kFitSteps = 5;
 // Vertices slide more freely than in a fit of what is meshed again: on to the crease, if it takes some steps.
 constexpr double kDamping = 0.001;
-constexpr int kLattice = 3;      // of the samples in a triangle
 constexpr double kGain = 0.9;    // of the error, at most, for a flip to be worth it
 constexpr double kWorth = 0.25;  // of the mean error of two triangles: less is not looked at
 
 struct Flip {
-    double gain = 0.0;
-    std::array<int, 2> triangle{};
-    std::array<Triangle, 2> after{};
+    double gain;
+    std::array<int, 2> triangle;
+    std::array<Triangle, 2> after;
+    std::array<FacetValues, 2> facet;  // after it
 };
 
 class ErrorFlips {
@@ -43,25 +46,26 @@ public:
     /// Flips what gains most first, and nothing next to it. Returns the triangles.
     std::vector<std::array<int, 2>> pass(const std::vector<char>& movable) {
         const Corners corners(points_.size(), triangles_);
-        std::vector<char> concerned;
-        for (const auto& [i, j, k] : triangles_) concerned.push_back(movable[i] || movable[j] || movable[k]);
+        facets_.resize(triangles_.size());
         std::vector<double> error(triangles_.size(), 0.0);
         for_each_triangle([&](std::size_t t) {
-            if (concerned[t]) error[t] = error_of(triangles_[t], probes_.local()).first;
+            const auto& [i, j, k] = triangles_[t];
+            if (!movable[i] && !movable[j] && !movable[k]) return;
+            facets_[t] = facet_of(triangles_[t], probes_.local());
+            error[t] = facets_[t].error();
         });
         const auto count = std::count_if(error.begin(), error.end(), [](double e) { return e > 0.0; });
         const double worth = 2.0 * kWorth * std::accumulate(error.begin(), error.end(), 0.0) /
                              static_cast<double>(std::max<std::ptrdiff_t>(1, count));
-        std::vector<std::array<Flip, 3>> of_triangle(triangles_.size());
-        for_each_triangle([&](std::size_t t) {
-            if (!concerned[t]) return;
-            for (int k = 0; k < 3; ++k)
-                of_triangle[t][k] = flip_of(static_cast<int>(t), k, corners, concerned, error, worth);
-        });
-        std::vector<Flip> flips;
-        for (const auto& some : of_triangle)
-            for (const Flip& flip : some)
-                if (flip.gain > 0.0) flips.push_back(flip);
+        constexpr std::size_t kTrianglesPerBlock = 1024;
+        std::vector<Flip> flips = find_in_blocks<Flip>(
+            triangles_.size(), kTrianglesPerBlock,
+            [&](std::size_t begin, std::size_t end, std::vector<Flip>& found) {
+                for (std::size_t t = begin; t < end; ++t)
+                    for (int k = 0; k < 3; ++k)
+                        if (auto flip = flip_of(static_cast<int>(t), k, corners, error, worth))
+                            found.push_back(*flip);
+            });
         std::stable_sort(flips.begin(), flips.end(),
                          [](const Flip& a, const Flip& b) { return a.gain > b.gain; });
         std::vector<char> touched(points_.size(), 0);
@@ -73,12 +77,15 @@ public:
             if (is_touched(flip.after[0]) || is_touched(flip.after[1])) continue;
             for (int i = 0; i < 2; ++i) {
                 triangles_[flip.triangle[i]] = flip.after[i];
+                facets_[flip.triangle[i]] = flip.facet[i];
                 for (const int v : flip.after[i]) touched[v] = 1;
             }
             done.push_back(flip.triangle);
         }
         return done;
     }
+    /// Of the triangles after the last pass.
+    const std::vector<FacetValues>& facets() const { return facets_; }
 
 private:
     template <typename Body>
@@ -88,11 +95,13 @@ private:
         });
     }
 
-    /// Twice the area times the mean square, and the largest.
-    std::pair<double, double> error_of(const Triangle& t, Surface::Probe& probe) const {
-        const Vec3 &a = points_[t[0]], &b = points_[t[1]], &c = points_[t[2]];
-        const TriangleError error = triangle_error(a, b, c, probe, kLattice, 0.5 * tolerance_);
-        return {(b - a).cross(c - a).norm() * error.mean_square, error.largest};
+    FacetValues facet_of(const Triangle& t, Surface::Probe& probe) const {
+        return {points_[t[0]], points_[t[1]], points_[t[2]], probe};
+    }
+    double largest_error(const Triangle& t, Surface::Probe& probe) const {
+        return triangle_error(points_[t[0]], points_[t[1]], points_[t[2]], probe, FacetValues::kSteps,
+                              0.5 * tolerance_)
+            .largest;
     }
     double sharpness_of(const Triangle& t) const {
         return sharpness(points_[t[0]], points_[t[1]], points_[t[2]]);
@@ -107,31 +116,62 @@ private:
         return has(triangles_, corners) || has(at_start_, corners_at_start_);
     }
 
-    /// The other diagonal for the edge opposite to corner k, from the side of its lower vertex; without gain
-    /// where it may not be.
-    Flip flip_of(int t, int k, const Corners& corners, const std::vector<char>& concerned,
-                 const std::vector<double>& error, double worth) {
+    /// About the error of triangles t and `other` with the other diagonal, from a to d instead of from b to
+    /// c; infinite where the diagonals do not cross. On the new triangles the surface is a pyramid higher or
+    /// lower, by the distance between the diagonals where they cross.
+    double expected_error(int t, int other, int a, int b, int c, int d) const {
+        const Vec3 &pa = points_[a], &pb = points_[b], old = points_[c] - pb, now = points_[d] - pa;
+        const Vec3 normal = (facets_[t].normal + facets_[other].normal).normalized();
+        const double across = normal.dot(now.cross(old));
+        const double s = normal.dot(now.cross(pa - pb)) / across, r = normal.dot(old.cross(pa - pb)) / across;
+        if (!(s > 0.0 && s < 1.0 && r > 0.0 && r < 1.0)) return std::numeric_limits<double>::infinity();
+        const double height = normal.dot(pa + r * now - pb - s * old);
+        double sum = 0.0;
+        for (const int of : {t, other}) {
+            const FacetValues& facet = facets_[of];
+            const auto corner = [&](int v) {
+                return std::find(triangles_[of].begin(), triangles_[of].end(), v) - triangles_[of].begin();
+            };
+            const auto at_b = corner(b), at_c = corner(c);
+            double squares = 0.0;
+            for (int n = 0; n < FacetValues::kPoints; ++n) {
+                const auto& place = FacetValues::kPlace[n];
+                const double x = facet.value[n] + height * std::min(place[at_c] / s, place[at_b] / (1.0 - s));
+                squares += x * x;
+            }
+            sum += facet.area2 * squares / FacetValues::kPoints;
+        }
+        return sum;
+    }
+
+    /// The other diagonal for the edge opposite to corner k, from the side of its lower vertex; none where it
+    /// may not be, or gains too little. `error`: of each triangle, 0 of those that stay.
+    std::optional<Flip> flip_of(int t, int k, const Corners& corners, const std::vector<double>& error,
+                                double worth) {
         const Triangle& old = triangles_[t];
         const int a = old[k], b = old[(k + 1) % 3], c = old[(k + 2) % 3];
-        if (b > c) return {};
+        if (b > c || !(error[t] > 0.0)) return {};
         const auto [d, other] = corners.beyond(c, b, triangles_);
-        if (d < 0 || d == a || !concerned[other] || error[t] + error[other] < worth) return {};
+        if (d < 0 || d == a || !(error[other] > 0.0) || error[t] + error[other] < worth) return {};
+        const double before = error[t] + error[other];
+        if (!(expected_error(t, other, a, b, c, d) < before)) return {};
         const std::array<Triangle, 2> after = {{{a, b, d}, {a, d, c}}};
         const double blunt_enough =
             std::max({kSharpnessAt30Degrees, sharpness_of(old), sharpness_of(triangles_[other])});
         if (!(std::max(sharpness_of(after[0]), sharpness_of(after[1])) <= blunt_enough)) return {};
         if (is_edge(a, d, corners)) return {};
         Surface::Probe& probe = probes_.local();
-        const double before = error[t] + error[other];
-        const auto [first, first_largest] = error_of(after[0], probe);
-        if (!(first < kGain * before)) return {};
-        const auto [second, second_largest] = error_of(after[1], probe);
-        if (!(first + second < kGain * before) || std::max(first_largest, second_largest) > tolerance_)
+        const FacetValues first = facet_of(after[0], probe);
+        if (!(first.error() < kGain * before)) return {};
+        const FacetValues second = facet_of(after[1], probe);
+        const double now = first.error() + second.error();
+        if (!(now < kGain * before) || largest_error(after[0], probe) > tolerance_ ||
+            largest_error(after[1], probe) > tolerance_)
             return {};
         const double facing_before = std::min(facing(old, probe), facing(triangles_[other], probe));
         if (!(std::min(facing(after[0], probe), facing(after[1], probe)) > std::min(kFacing, facing_before)))
             return {};
-        return {before - first - second, {t, other}, after};
+        return Flip{before - now, {t, other}, after, {first, second}};
     }
 
     const std::vector<Vec3>& points_;
@@ -140,6 +180,7 @@ private:
     const Corners corners_at_start_;
     ThreadProbes probes_;
     const double tolerance_;
+    std::vector<FacetValues> facets_;
 };
 
 }  // namespace
@@ -152,7 +193,7 @@ std::vector<std::array<int, 2>> refit(std::vector<Vec3>& vertices, std::vector<T
     for (int round = 0; round < kRounds; ++round) {
         const auto some = flips.pass(movable);
         done.insert(done.end(), some.begin(), some.end());
-        fit(vertices, triangles, surface, kFitSteps, movable, kDamping);
+        fit_steps(vertices, triangles, flips.facets(), surface, kFitSteps, movable, kDamping);
     }
     return done;
 }
