@@ -8,6 +8,7 @@
 
 #include "isotrack/meshing/refit.h"
 #include "isotrack/meshing/self_intersections.h"
+#include "meshing/crossing_triangles.h"
 #include "meshing/sharpness.h"
 #include "meshing/triangle_box.h"
 #include "surface/float_precision.h"
@@ -135,6 +136,15 @@ std::vector<char> poor_vertices(const FrameMesh& mesh, const Inspection& inspect
     return result;
 }
 
+/// Of triangles that cross others, where one of them is unchecked.
+std::vector<char> crossing_flags(const FrameMesh& mesh, const std::vector<char>& unchecked) {
+    if (!unchecked.empty()) return crossing_triangles(mesh.vertices, mesh.carved.triangles, unchecked);
+    std::vector<char> result(mesh.carved.triangles.size(), 0);
+    for (const auto& [t, u] : self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}))
+        result[t] = result[u] = 1;
+    return result;
+}
+
 }  // namespace
 
 Inspection refit_within(FrameMesh& mesh, const Inspection& before, const std::vector<char>& movable,
@@ -142,6 +152,7 @@ Inspection refit_within(FrameMesh& mesh, const Inspection& before, const std::ve
     std::vector<char> moving = poor_vertices(mesh, before, tolerance);
     for (std::size_t v = 0; v < moving.size(); ++v) moving[v] = moving[v] && movable[v];
     Refitted refitted(mesh, moving, surface, tolerance);
+    std::vector<char> unchecked;  // triangles that may cross others since that was looked at; empty: all
     for (;;) {
         Inspection inspection = inspector.inspect_both_ways(mesh);
         inspector.look_between(mesh, inspection);
@@ -158,10 +169,19 @@ Inspection refit_within(FrameMesh& mesh, const Inspection& before, const std::ve
                                  [&](const auto& c) { return refitted.is_near(t, c.point); }));
             }
         });
-        for (const auto& [t, u] : self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}))
-            if (refitted.is_changed(t) || refitted.is_changed(u)) bad[t] = bad[u] = 1;  // not there before
+        const std::vector<char> crossing = crossing_flags(mesh, unchecked);
+        for (std::size_t t = 0; t < bad.size(); ++t) bad[t] = bad[t] || crossing[t];
+        const std::vector<Vec3> vertices = mesh.vertices;
+        const std::vector<Triangle> triangles = mesh.carved.triangles;
         if (std::find(bad.begin(), bad.end(), 1) == bad.end() || !refitted.undo(std::move(bad)))
             return inspection;
+        unchecked.assign(triangles.size(), 0);
+        for (std::size_t t = 0; t < triangles.size(); ++t) {
+            const Triangle& now = mesh.carved.triangles[t];
+            unchecked[t] = now != triangles[t] || std::any_of(now.begin(), now.end(), [&](int v) {
+                               return mesh.vertices[v] != vertices[v];
+                           });
+        }
     }
 }
 
