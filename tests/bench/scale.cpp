@@ -114,7 +114,7 @@ struct TrackArguments {
     double tolerance = 0.0;
     std::size_t measure = 2;
     int threads = 0;
-    bool peers = false;
+    bool fit = false, peers = false;
 };
 
 double volume_to_mesh_seconds(const LevelSet& level_set, double adaptivity) {
@@ -135,6 +135,7 @@ int track(const TrackArguments& arguments) {
     const std::vector<InputFrame> input = find_frames({arguments.input}).frames;
     TrackerOptions options;
     options.tolerance = arguments.tolerance;
+    options.fit = arguments.fit;
     Tracker tracker(options);
 
     Json row{{"voxels", 0.0}, {"particles", 0.0}, {"not_kept", 0.0}, {"seeded", 0.0},
@@ -153,7 +154,8 @@ int track(const TrackArguments& arguments) {
         reset_peak();
         TrackedFrame frame;
         const double advance = seconds_of([&] { frame = tracker.advance(*level_set); });
-        row["above_mb"] = std::max(row["above_mb"].get<double>(), memory_mb("VmHWM") - memory_mb("RssFile") - grid_mb);
+        row["above_mb"] =
+            std::max(row["above_mb"].get<double>(), memory_mb("VmHWM") - memory_mb("RssFile") - grid_mb);
         if (i + arguments.measure < input.size()) continue;
         const auto add = [&](const std::string& name, double value) {
             row[name] = row.value(name, 0.0) + value / measured;
@@ -240,6 +242,7 @@ int main(int argc, char** argv) {
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     track_command->add_option("--threads", to_track.threads, "0: one per core")->capture_default_str();
+    track_command->add_flag("--fit", to_track.fit, "Vertices leave the surface, as by isotrack mesh --fit");
     track_command->add_flag("--peers", to_track.peers, "OpenVDB's volumeToMesh on the same grids, too");
     track_command->callback([&] { result = track(to_track); });
 
