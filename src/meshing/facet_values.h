@@ -1,10 +1,12 @@
-// The surface's values on one facet, at the points that a fit and its flips go by.
+// The surface's values on facets, at the points that a fit and its flips go by.
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "isotrack/surface/surface.h"
 #include "isotrack/types.h"
+#include "meshing/corners.h"
 
 namespace isotrack {
 
@@ -12,7 +14,7 @@ struct FacetValues {
     static constexpr int kSteps = 3;  ///< Per edge, of the barycentric lattice that the points are.
     static constexpr int kPoints = (kSteps + 1) * (kSteps + 2) / 2;
 
-    Vec3 normal = Vec3::Zero();  ///< Unit; zero without area, as all else then.
+    Vec3 normal = Vec3::Zero();  ///< Unit; zero without area.
     double area2 = 0.0;          ///< Twice the area.
     std::array<double, kPoints> value{};
 
@@ -30,16 +32,20 @@ struct FacetValues {
     }();
 
     FacetValues() = default;
-    FacetValues(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
+    FacetValues(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) : FacetValues(a, b, c) {
+        for (int n = 0; n < kPoints; ++n) value[n] = probe.value(place(n, a, b, c));
+    }
+    /// All values zero.
+    FacetValues(const Vec3& a, const Vec3& b, const Vec3& c) {
         const Vec3 cross = (b - a).cross(c - a);
         const double length = cross.norm();
         if (!(length > 0.0)) return;
         area2 = length;
         normal = cross / length;
-        for (int n = 0; n < kPoints; ++n) {
-            const auto& [u, v, w] = kPlace[n];
-            value[n] = probe.value(u * a + v * b + w * c);
-        }
+    }
+    static Vec3 place(int n, const Vec3& a, const Vec3& b, const Vec3& c) {
+        const auto& [u, v, w] = kPlace[n];
+        return u * a + v * b + w * c;
     }
 
     /// Twice the area times the mean square.
@@ -49,5 +55,11 @@ struct FacetValues {
         return area2 * sum / kPoints;
     }
 };
+
+/// Those of all triangles. What they have in common is read once: values at a vertex, and on an edge that is
+/// in both directions. `corners`: of the triangles. Uses TBB inside; the values are those of each alone.
+std::vector<FacetValues> facet_values(const std::vector<Vec3>& vertices,
+                                      const std::vector<Triangle>& triangles, const Corners& corners,
+                                      const Surface& surface);
 
 }  // namespace isotrack

@@ -1,16 +1,14 @@
 #include "isotrack/meshing/fit.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
+#include <iterator>
 
 #include "meshing/fit_steps.h"
-#include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
 
-constexpr int kStepsPerReading = 5;
+constexpr int kStepsPerReading = 3;
 
 }  // namespace
 
@@ -18,19 +16,13 @@ void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, co
          int steps, const std::vector<char>& movable, double damping) {
     const std::vector<char> all(movable.empty() ? vertices.size() : 0, 1);
     const std::vector<char>& moves = movable.empty() ? all : movable;
-    std::vector<FacetValues> facets(triangles.size());
-    ThreadProbes probes(surface);
-    for (; steps > 0; steps -= kStepsPerReading) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
-            Surface::Probe& probe = probes.local();
-            for (std::size_t t = range.begin(); t < range.end(); ++t) {
-                const auto& [i, j, k] = triangles[t];
-                if (any_moves(triangles[t], moves))
-                    facets[t] = FacetValues(vertices[i], vertices[j], vertices[k], probe);
-            }
-        });
-        fit_steps(vertices, triangles, facets, surface, std::min(steps, kStepsPerReading), moves, damping);
-    }
+    std::vector<Triangle> moving;
+    std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(moving),
+                 [&](const Triangle& t) { return moves[t[0]] || moves[t[1]] || moves[t[2]]; });
+    const Corners corners(vertices.size(), moving);
+    for (; steps > 0; steps -= kStepsPerReading)
+        fit_steps(vertices, moving, corners, facet_values(vertices, moving, corners, surface), surface,
+                  std::min(steps, kStepsPerReading), moves, damping);
 }
 
 }  // namespace isotrack

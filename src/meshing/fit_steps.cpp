@@ -2,14 +2,13 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/LU>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
 
-#include "meshing/corners.h"
 #include "meshing/sharpness.h"
 #include "surface/thread_probes.h"
 
@@ -97,7 +96,7 @@ void undo_spoilt(const std::vector<Vec3>& vertices, const std::vector<Triangle>&
         std::atomic<bool> any = false;
         for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
             const auto& [i, j, k] = triangles[t];
-            if (!back[i] && !back[j] && !back[k]) return;  // it was good, or no corner of it may move
+            if (!back[i] && !back[j] && !back[k]) return;  // it was good, or no corner of it moves
             bad[t] = spoilt(vertices[i], vertices[j], vertices[k], to[i], to[j], to[k]);
             if (bad[t]) any.store(true, std::memory_order_relaxed);
         });
@@ -115,24 +114,13 @@ void undo_spoilt(const std::vector<Vec3>& vertices, const std::vector<Triangle>&
 
 }  // namespace
 
-bool any_moves(const Triangle& t, const std::vector<char>& movable) {
-    return movable[t[0]] || movable[t[1]] || movable[t[2]];
-}
-
-void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& all_triangles,
+void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, const Corners& corners,
                const std::vector<FacetValues>& facets, const Surface& surface, int steps,
                const std::vector<char>& movable, double damping) {
-    std::vector<Triangle> triangles;
-    std::vector<Share> shares;
+    std::vector<Share> shares(facets.begin(), facets.end());
     std::vector<int> moving;
-    for (std::size_t t = 0; t < all_triangles.size(); ++t)
-        if (any_moves(all_triangles[t], movable)) {
-            triangles.push_back(all_triangles[t]);
-            shares.emplace_back(facets[t]);
-        }
     for (std::size_t v = 0; v < vertices.size(); ++v)
         if (movable[v]) moving.push_back(static_cast<int>(v));
-    const Corners corners(vertices.size(), triangles);
 
     std::vector<Mat3> inverse(moving.size());  // of the quadrics, zero without one
     std::vector<char> creased(vertices.size(), 0);
@@ -146,10 +134,10 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& all_tri
             sum += s.normal;
         }
         for (int e = corners.first[v]; e < corners.first[v + 1]; ++e)
-            if (shares[corners.corner[e] / 3].normal.dot(sum) < kSmooth * sum.norm()) creased[v] = 1;
+            if (!(shares[corners.corner[e] / 3].normal.dot(sum) > kSmooth * sum.norm())) creased[v] = 1;
         const double trace = quadric.trace();
         quadric.diagonal().array() += damping * trace;
-        inverse[m] = trace > 0.0 ? Mat3(quadric.inverse()) : Mat3(Mat3::Zero());
+        inverse[m] = trace > 0.0 ? Mat3(quadric.ldlt().solve(Mat3::Identity())) : Mat3(Mat3::Zero());
     });
     std::vector<Vec3> to = vertices;
     ThreadProbes probes(surface);
@@ -170,14 +158,15 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& all_tri
             to[v] = vertices[v] + move;
         });
         undo_spoilt(vertices, triangles, corners, moving, to);
-        for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
-            const auto& [i, j, k] = triangles[t];
-            const auto way = [&](int v) { return shares[t].normal.dot(to[v] - vertices[v]); };
-            if (!creased[i] && !creased[j] && !creased[k])
-                shares[t].move({way(i), way(j), way(k)});
-            else if (step + 1 < steps)
-                shares[t] = Share({to[i], to[j], to[k], probes.local()});
-        });
+        if (step + 1 < steps)
+            for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
+                const auto& [i, j, k] = triangles[t];
+                const auto way = [&](int v) { return shares[t].normal.dot(to[v] - vertices[v]); };
+                if (creased[i] || creased[j] || creased[k])
+                    shares[t] = Share({to[i], to[j], to[k], probes.local()});
+                else
+                    shares[t].move({way(i), way(j), way(k)});
+            });
         for (const int v : moving) vertices[v] = to[v];
     }
 }

@@ -4,17 +4,15 @@
 #include <vector>
 
 #include "isotrack/types.h"
+#include "meshing/corners.h"
 #include "meshing/facet_values.h"
 
 namespace isotrack {
 
-/// Whether a corner does.
-bool any_moves(const Triangle& triangle, const std::vector<char>& movable);
-
 /// Steps of `fit`, with values that change from `facets` on (one per triangle) as the planes of the facets
-/// move. Those at creases change otherwise: they are read again at each step. Triangles without movable
-/// corners need no values.
-void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+/// move. Those at creases change otherwise: they are read again at each step. `corners`: of the triangles,
+/// which must be all around a movable vertex.
+void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, const Corners& corners,
                const std::vector<FacetValues>& facets, const Surface& surface, int steps,
                const std::vector<char>& movable, double damping);
 

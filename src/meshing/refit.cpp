@@ -1,7 +1,5 @@
 #include "isotrack/meshing/refit.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <limits>
 #include <numeric>
@@ -19,7 +17,7 @@ namespace isotrack {
 namespace {
 
 constexpr int kRounds = 2;
-constexpr int kFitSteps = 5;
+constexpr int kFitSteps = 3;
 // Vertices slide more freely than in a fit of what is meshed again: on to the crease, if it takes some steps.
 constexpr double kDamping = 0.001;
 constexpr double kGain = 0.9;    // of the error, at most, for a flip to be worth it
@@ -40,20 +38,19 @@ public:
           triangles_(triangles),
           at_start_(triangles),
           corners_at_start_(points.size(), triangles),
+          surface_(surface),
           probes_(surface),
           tolerance_(tolerance) {}
 
     /// Flips what gains most first, and nothing next to it. Returns the triangles.
     std::vector<std::array<int, 2>> pass(const std::vector<char>& movable) {
         const Corners corners(points_.size(), triangles_);
-        facets_.resize(triangles_.size());
+        facets_ = facet_values(points_, triangles_, corners, surface_);
         std::vector<double> error(triangles_.size(), 0.0);
-        for_each_triangle([&](std::size_t t) {
+        for (std::size_t t = 0; t < triangles_.size(); ++t) {
             const auto& [i, j, k] = triangles_[t];
-            if (!movable[i] && !movable[j] && !movable[k]) return;
-            facets_[t] = facet_of(triangles_[t], probes_.local());
-            error[t] = facets_[t].error();
-        });
+            if (movable[i] && movable[j] && movable[k]) error[t] = facets_[t].error();
+        }
         const auto count = std::count_if(error.begin(), error.end(), [](double e) { return e > 0.0; });
         const double worth = 2.0 * kWorth * std::accumulate(error.begin(), error.end(), 0.0) /
                              static_cast<double>(std::max<std::ptrdiff_t>(1, count));
@@ -88,13 +85,6 @@ public:
     const std::vector<FacetValues>& facets() const { return facets_; }
 
 private:
-    template <typename Body>
-    void for_each_triangle(const Body& body) const {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles_.size(), 64), [&](const auto& range) {
-            for (std::size_t t = range.begin(); t < range.end(); ++t) body(t);
-        });
-    }
-
     FacetValues facet_of(const Triangle& t, Surface::Probe& probe) const {
         return {points_[t[0]], points_[t[1]], points_[t[2]], probe};
     }
@@ -116,9 +106,10 @@ private:
         return has(triangles_, corners) || has(at_start_, corners_at_start_);
     }
 
-    /// About the error of triangles t and `other` with the other diagonal, from a to d instead of from b to
-    /// c; infinite where the diagonals do not cross. On the new triangles the surface is a pyramid higher or
-    /// lower, by the distance between the diagonals where they cross.
+    /// About the least error that triangles t and `other` may have with the other diagonal, from a to d
+    /// instead of from b to c; infinite where the diagonals do not cross. From old to new triangles is a
+    /// pyramid, as high as the diagonals are apart where they cross. Across it the value changes with a slope
+    /// that is not known: 1 where the surface faces as the triangles do, less at a crease.
     double expected_error(int t, int other, int a, int b, int c, int d) const {
         const Vec3 &pa = points_[a], &pb = points_[b], old = points_[c] - pb, now = points_[d] - pa;
         const Vec3 normal = (facets_[t].normal + facets_[other].normal).normalized();
@@ -126,22 +117,25 @@ private:
         const double s = normal.dot(now.cross(pa - pb)) / across, r = normal.dot(old.cross(pa - pb)) / across;
         if (!(s > 0.0 && s < 1.0 && r > 0.0 && r < 1.0)) return std::numeric_limits<double>::infinity();
         const double height = normal.dot(pa + r * now - pb - s * old);
-        double sum = 0.0;
+        double values2 = 0.0, values_by_heights = 0.0, heights2 = 0.0;  // integrals
         for (const int of : {t, other}) {
             const FacetValues& facet = facets_[of];
             const auto corner = [&](int v) {
                 return std::find(triangles_[of].begin(), triangles_[of].end(), v) - triangles_[of].begin();
             };
             const auto at_b = corner(b), at_c = corner(c);
-            double squares = 0.0;
+            const double weight = facet.area2 / FacetValues::kPoints;
             for (int n = 0; n < FacetValues::kPoints; ++n) {
                 const auto& place = FacetValues::kPlace[n];
-                const double x = facet.value[n] + height * std::min(place[at_c] / s, place[at_b] / (1.0 - s));
-                squares += x * x;
+                const double x = facet.value[n],
+                             h = height * std::min(place[at_c] / s, place[at_b] / (1.0 - s));
+                values2 += weight * x * x;
+                values_by_heights += weight * x * h;
+                heights2 += weight * h * h;
             }
-            sum += facet.area2 * squares / FacetValues::kPoints;
         }
-        return sum;
+        const double slope = heights2 > 0.0 ? std::clamp(-values_by_heights / heights2, 0.0, 1.0) : 0.0;
+        return values2 + slope * (2.0 * values_by_heights + slope * heights2);
     }
 
     /// The other diagonal for the edge opposite to corner k, from the side of its lower vertex; none where it
@@ -154,7 +148,7 @@ private:
         const auto [d, other] = corners.beyond(c, b, triangles_);
         if (d < 0 || d == a || !(error[other] > 0.0) || error[t] + error[other] < worth) return {};
         const double before = error[t] + error[other];
-        if (!(expected_error(t, other, a, b, c, d) < before)) return {};
+        if (!(expected_error(t, other, a, b, c, d) < kGain * before)) return {};
         const std::array<Triangle, 2> after = {{{a, b, d}, {a, d, c}}};
         const double blunt_enough =
             std::max({kSharpnessAt30Degrees, sharpness_of(old), sharpness_of(triangles_[other])});
@@ -178,6 +172,7 @@ private:
     std::vector<Triangle>& triangles_;
     const std::vector<Triangle> at_start_;
     const Corners corners_at_start_;
+    const Surface& surface_;
     ThreadProbes probes_;
     const double tolerance_;
     std::vector<FacetValues> facets_;
@@ -193,7 +188,8 @@ std::vector<std::array<int, 2>> refit(std::vector<Vec3>& vertices, std::vector<T
     for (int round = 0; round < kRounds; ++round) {
         const auto some = flips.pass(movable);
         done.insert(done.end(), some.begin(), some.end());
-        fit_steps(vertices, triangles, flips.facets(), surface, kFitSteps, movable, kDamping);
+        fit_steps(vertices, triangles, Corners(vertices.size(), triangles), flips.facets(), surface,
+                  kFitSteps, movable, kDamping);
     }
     return done;
 }

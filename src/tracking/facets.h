@@ -10,8 +10,8 @@ namespace isotrack {
 
 /// A triangle by the cell and facet it is, and where its corners are.
 struct Facet {
-    int key;  ///< Ascending over a mesh but for halves of split triangles and triangles on a flipped
-              ///< diagonal, which have -1 and equal nothing.
+    int key;  ///< Ascending over a mesh but for halves of split triangles and those put in, which have -1 and
+              ///< equal nothing.
     std::array<Eigen::Vector3f, 3> corner;  ///< Vertices are rounded to floats before they are looked at.
     bool operator==(const Facet& o) const { return key >= 0 && key == o.key && corner == o.corner; }
 };

@@ -4,13 +4,22 @@
 #include <utility>
 
 #include "isotrack/meshing/fit.h"
+#include "isotrack/meshing/refit.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "surface/float_precision.h"
 
 namespace isotrack {
 namespace {
 
-constexpr int kFitSteps = 9;
+constexpr int kFirstSteps = 3, kNextSteps = 6;  // others follow the flips of the first mesh
+constexpr int kRings = 2;
+
+void add_ring(std::vector<char>& flags, const std::vector<Triangle>& triangles) {
+    const std::vector<char> before = flags;
+    for (const Triangle& t : triangles)
+        if (before[t[0]] || before[t[1]] || before[t[2]])
+            for (const int v : t) flags[v] = 1;
+}
 
 }  // namespace
 
@@ -20,62 +29,60 @@ void Fitted::take(const FrameMesh& mesh, std::size_t particles) {
         if (const int p = mesh.carved.particle[v]; p >= 0) position_[p] = mesh.vertices[v];
 }
 
-void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface) {
-    const auto& triangles = mesh.carved.triangles;
+void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface, double tolerance) {
+    auto& triangles = mesh.carved.triangles;
+    const bool is_first = facets_.empty();
     const MeshFacets facets(mesh.carved, mesh.on_surface);
     std::vector<char> movable(mesh.vertices.size(), 0);
+    std::vector<int> now(facets_.size(), -1);
     compare(
-        facets, facets_, [](std::size_t, std::size_t) {},
+        facets, facets_, [&](std::size_t f, std::size_t old) { now[old] = static_cast<int>(f); },
         [&](std::size_t f, const Facet&) {
             for (const int v : triangles[f]) movable[v] = 1;
         },
         [](std::size_t) {});
-    std::vector<int> copies(particles, 0);  // of which only one place is known
-    for (const int p : mesh.carved.particle)
-        if (p >= 0) ++copies[p];
-    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-        const int p = mesh.carved.particle[v];
-        if (p < 0 || copies[p] > 1) movable[v] = 1;
-        if (!movable[v]) mesh.vertices[v] = position_[p];
-    }
-    constexpr int kRings = 2;
-    for (int ring = 0; ring < kRings; ++ring) {
-        const std::vector<char> before = movable;
-        for (const Triangle& t : triangles)
-            if (before[t[0]] || before[t[1]] || before[t[2]])
-                for (const int v : t) movable[v] = 1;
-    }
-    fit(mesh.vertices, triangles, surface, kFitSteps, movable);
-    for (Vec3& v : mesh.vertices) v = to_float_precision(v);
     facets.write_to(facets_);
+    const std::vector<int> vertex = lone_vertices(mesh, particles);
+    std::vector<char> lone(mesh.vertices.size(), 0);
+    for (const int v : vertex)
+        if (v >= 0) lone[v] = 1;
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+        if (!lone[v]) movable[v] = 1;  // where it was is not known
+        if (!movable[v]) mesh.vertices[v] = position_[mesh.carved.particle[v]];
+    }
+    flips_.put_into(mesh.carved, now, vertex, movable);
+    for (int ring = 0; ring < kRings; ++ring) add_ring(movable, triangles);
+    fit(mesh.vertices, triangles, surface, is_first ? kFirstSteps : kNextSteps, movable);
+    if (is_first) {
+        const std::vector<Triangle> before = triangles;
+        flips_ = KeptFlips(refit(mesh.vertices, triangles, surface, tolerance, lone), before, mesh.carved);
+    }
+    for (Vec3& v : mesh.vertices) v = to_float_precision(v);
     take(mesh, particles);
 }
 
 bool Fitted::undo_crossing(FrameMesh& mesh, std::size_t particles) {
-    TriangleMesh tested;
-    tested.triangles = mesh.carved.triangles;
+    const std::vector<int> vertex = lone_vertices(mesh, particles);
     std::vector<char> undo(mesh.vertices.size(), 0);
-    for (bool any = true; any;) {
-        tested.points = mesh.vertices;
-        any = false;
-        const auto back = [&](int v) {
-            undo[v] = 1;
-            any = any || mesh.vertices[v] != mesh.on_surface[v];
-        };
-        for (const auto& pair : self_intersections(tested))
-            for (const int t : {pair.first, pair.second})
-                for (const int v : tested.triangles[t]) back(v);
-        if (!any && std::count(undo.begin(), undo.end(), 1) == 0) break;
+    bool any = false;
+    for (;;) {
+        const auto crossing = self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}});
+        if (crossing.empty()) break;
+        any = true;
+        for (const auto& [t, u] : crossing)
+            for (const int of : {t, u})
+                for (const int v : mesh.carved.triangles[of]) undo[v] = 1;
+        bool changed = flips_.undo_at(undo, vertex, mesh.carved);
         for (std::size_t v = 0; v < undo.size(); ++v)
-            if (undo[v]) mesh.vertices[v] = mesh.on_surface[v];
-        if (!any) break;
-        const std::vector<char> ring = undo;
-        for (const Triangle& t : tested.triangles)
-            if (ring[t[0]] || ring[t[1]] || ring[t[2]])
-                for (const int v : t) undo[v] = 1;
+            if (undo[v]) {
+                changed = changed || mesh.vertices[v] != mesh.on_surface[v];
+                mesh.vertices[v] = mesh.on_surface[v];
+            }
+        if (!changed) break;
+        add_ring(undo, mesh.carved.triangles);
     }
-    take(mesh, particles);
-    return std::find(undo.begin(), undo.end(), 1) != undo.end();
+    if (any) take(mesh, particles);
+    return any;
 }
 
 }  // namespace isotrack

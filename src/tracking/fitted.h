@@ -6,19 +6,22 @@
 
 #include "isotrack/surface/surface.h"
 #include "tracking/facets.h"
-#include "tracking/inspection.h"
+#include "tracking/frame_mesh.h"
+#include "tracking/kept_flips.h"
 
 namespace isotrack {
 
-/// Where the vertices of the last mesh were fitted to.
+/// Where the vertices of the last mesh were fitted to, and which edges were flipped for it.
 class Fitted {
 public:
-    /// Fits anew what is within two rings of where the mesh differs from the last one; the rest goes to where
-    /// it was. `particles`: how many there are.
-    void fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface);
+    /// Fits the first mesh, and flips edges that keep its triangles from their surface; none of these get
+    /// beyond `tolerance` by a flip. Of the next ones it fits anew what is within two rings of where the mesh
+    /// differs from the last one; the rest goes to where it was, with the same flips. A flipped triangle
+    /// keeps the cell and facet of the one in whose place it is. `particles`: how many there are.
+    void fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface, double tolerance);
 
-    /// Puts fitted vertices back where their triangles cross others, a ring further each time, until none
-    /// cross. Facets of a DT do not. Returns whether any did.
+    /// Puts vertices and edges back where triangles cross others, a ring further each time, until none cross.
+    /// Facets of a DT do not. Returns whether any did.
     bool undo_crossing(FrameMesh& mesh, std::size_t particles);
 
 private:
@@ -26,6 +29,7 @@ private:
 
     std::vector<Facet> facets_;   // before the fit
     std::vector<Vec3> position_;  // per particle
+    KeptFlips flips_;
 };
 
 }  // namespace isotrack

@@ -4,6 +4,15 @@
 
 namespace isotrack {
 
+std::vector<int> lone_vertices(const FrameMesh& mesh, std::size_t particles) {
+    constexpr int kNone = -1, kSeveral = -2;
+    std::vector<int> result(particles, kNone);
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+        if (const int p = mesh.carved.particle[v]; p >= 0)
+            result[p] = result[p] == kNone ? static_cast<int>(v) : kSeveral;
+    return result;
+}
+
 FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out) {
     FrameMesh result = mesh;
     CarvedSurface& carved = result.carved;

@@ -1,6 +1,7 @@
 // A frame's mesh as it is worked on.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "isotrack/meshing/manifold.h"
@@ -17,6 +18,9 @@ struct FrameMesh {
 inline long euler_of(const FrameMesh& mesh) {
     return static_cast<long>(mesh.vertices.size()) - static_cast<long>(mesh.carved.triangles.size() / 2);
 }
+
+/// The vertex on each of so many particles; negative if there is none or several.
+std::vector<int> lone_vertices(const FrameMesh& mesh, std::size_t particles);
 
 /// The mesh less the flagged triangles and the vertices that none has then.
 FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out);

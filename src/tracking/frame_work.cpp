@@ -5,38 +5,22 @@
 
 #include "isotrack/meshing/blunting.h"
 #include "tracking/failing.h"
-#include "tracking/refitted.h"
 #include "tracking/stage_timer.h"
 
 namespace isotrack {
 namespace {
 
 constexpr int kBluntRounds = 3, kBluntPasses = 12;
-constexpr double kChangedShare = 0.96;  // of the tolerance, for the triangles they or the refit change
+constexpr double kChangedShare = 0.96;  // of the tolerance, for the triangles that change
 
 }  // namespace
 
 /// The vertices that stand for a particle alone: copies stay where they are.
 std::vector<char> FrameWork::movable() const {
-    const auto& particle = mesh.carved.particle;
-    const int last = particle.empty() ? -1 : *std::max_element(particle.begin(), particle.end());
-    std::vector<int> vertex(last + 1, -1);
-    std::vector<char> result;
-    for (const int p : particle) {
-        const int v = static_cast<int>(result.size());
-        result.push_back(p >= 0 && vertex[p] < 0);
-        if (p < 0) continue;
-        if (vertex[p] >= 0) result[vertex[p]] = 0;
-        vertex[p] = v;
-    }
+    std::vector<char> result(mesh.vertices.size(), 0);
+    for (const int v : lone_vertices(mesh, frame.particles))
+        if (v >= 0) result[v] = 1;
     return result;
-}
-
-/// Fits the mesh once more, with other diagonals.
-void FrameWork::refit() {
-    const StageTimer timer(frame.seconds, "fit");
-    inspection =
-        refit_within(mesh, inspection, movable(), surface, kChangedShare * limits.tolerance, *inspector);
 }
 
 /// Makes sharp triangles blunter. The particles stay where they are: the next frame's triangles are others.
@@ -58,9 +42,6 @@ void FrameWork::blunt() {
     // Where changed triangles are beyond the tolerance and farther off than those they stand for, and what is
     // missed that was not before.
     const auto spoilt = [&](bool look_between) {
-        for (const Blunting& change : blunter.changes())
-            if (change.vertex < 0)
-                for (const int t : change.triangle) mesh.carved.inside_cell[t] = CarvedSurface::kNoCell;
         inspection = {};  // first: there are many errors
         inspection = inspector->inspect_both_ways(mesh);
         if (look_between) {
@@ -91,7 +72,6 @@ void FrameWork::blunt() {
 
 TrackedFrame FrameWork::finish(const TrackerOptions& options) {
     if (options.method != Method::Paper) blunt();
-    if (options.method != Method::Paper && options.fit) refit();
     report(mesh, inspection, surface, frame);
     frame.mesh.points = std::move(mesh.vertices);
     frame.mesh.triangles = std::move(mesh.carved.triangles);

@@ -28,7 +28,6 @@ struct FrameWork {
 private:
     std::vector<char> movable() const;
     void blunt();
-    void refit();
 };
 
 }  // namespace isotrack

@@ -365,8 +365,10 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
         const auto x = whole ? dual_crossing(cells, particles.position, carved.inside_cell[t],
                                              carved.inside_facet[t], *probe)
                              : std::nullopt;
-        if (x) {
-            result.push_back({*x, (*x - particles.position[corner[0]]).norm()});
+        if (x) {  // in the middle of the facet's ball, whose corners a flip may have exchanged
+            const int on_ball =
+                cells.vertices[carved.inside_cell[t]][Tetrahedra::kFacet[carved.inside_facet[t]][0]];
+            result.push_back({*x, (*x - particles.position[on_ball]).norm()});
         } else if (is_too_far((*inspection.errors)[t], limits.tolerance)) {
             double h = limits.max_edge;
             for (const int p : corner)

@@ -233,7 +233,7 @@ struct Tracker::Impl {
     void follow(const Surface& surface, const SizingLimits& l, const Pace& pace, bool warm,
                 TrackedFrame& frame);
     void make_room(const Surface& surface, TrackedFrame& frame);
-    void measure(const Surface& surface, TrackedFrame& frame);
+    void measure(const Surface& surface, double tolerance, TrackedFrame& frame);
     void seed(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, double apart,
               TrackedFrame& frame);
     void sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, bool warm,
@@ -246,14 +246,14 @@ struct Tracker::Impl {
 };
 
 /// Meshes the particles, and measures what the next births and deaths go by.
-void Tracker::Impl::measure(const Surface& surface, TrackedFrame& frame) {
+void Tracker::Impl::measure(const Surface& surface, double tolerance, TrackedFrame& frame) {
     constexpr int kSizingSteps = 3;  // barycentric lattice of the samples: with the centroid
     auto& seconds = frame.seconds;
     tetrahedralise(true, seconds);
     FrameMesh mesh = carve_mesh(surface, seconds);
     if (options.fit) {
         const StageTimer timer(seconds, "fit");
-        Fitted().fit_vertices(mesh, particles.size(), surface);
+        Fitted().fit_vertices(mesh, particles.size(), surface, tolerance);
     }
     const StageTimer timer(seconds, "size");
     last_mesh.evidence.error = errors_at_particles(
@@ -274,16 +274,16 @@ void Tracker::Impl::seed(const Surface& surface, const CrossingGrid& crossings, 
 /// Rounds of: mesh, measure, follow.
 void Tracker::Impl::sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
                            bool warm, TrackedFrame& frame) {
-    measure(surface, frame);
+    measure(surface, l.tolerance, frame);
     // Where flat faces meet nearly all of the mean square is at few particles, and certify adds none for it.
     const bool dense = options.fit && !warm && share_with_error(last_mesh.evidence, l) < kFewWithError;
     if (dense) {
         seed(surface, crossings, l, kDenseSeeds, frame);
-        measure(surface, frame);
+        measure(surface, l.tolerance, frame);
     }
     const int rounds = dense ? kDenseRounds : kRounds;
     for (int round = 0; round < rounds; ++round) {
-        if (round > 0) measure(surface, frame);
+        if (round > 0) measure(surface, l.tolerance, frame);
         follow(surface, l, dense ? kDenseAtFirst : kAtFirst, warm, frame);
         if (!warm) arrange();
     }
@@ -390,7 +390,7 @@ void Tracker::Impl::Making::make_mesh() {
     work_.mesh = tracker_.carve_mesh(work_.surface, seconds);
     if (!options().fit) return;
     const StageTimer timer(seconds, "fit");
-    fitted_.fit_vertices(work_.mesh, particles().size(), work_.surface);
+    fitted_.fit_vertices(work_.mesh, particles().size(), work_.surface, work_.limits.tolerance);
 }
 
 bool Tracker::Impl::Making::is_thick() const {
@@ -462,7 +462,7 @@ void Tracker::Impl::Making::mend_components() {
             FrameMesh other = tracker_.mesh_of(of_cells, work_.surface);
             if (!options().fit) return other;
             Fitted its_own = fitted_;
-            its_own.fit_vertices(other, particles().size(), work_.surface);
+            its_own.fit_vertices(other, particles().size(), work_.surface, work_.limits.tolerance);
             its_own.undo_crossing(other, particles().size());
             return other;
         };
@@ -488,16 +488,12 @@ void Tracker::Impl::Making::certify() {
         const bool last = in_paper() || round == kCertifyRounds;
         const auto passes_or_last = [&] { return last || passes(); };
         inspection = inspector.inspect_both_ways(mesh);
-        bool between = round == 0;
-        if (between) inspector.look_between(mesh, inspection);
-        bool good = passes_or_last();
-        if (good && options().fit && fitted_.undo_crossing(mesh, particles().size())) {
+        if (!passes_or_last()) continue;
+        if (options().fit && fitted_.undo_crossing(mesh, particles().size())) {
             inspection = inspector.inspect_both_ways(mesh);
-            between = false;
-            good = passes_or_last();
+            if (!passes_or_last()) continue;
         }
-        if (!good) continue;
-        if (!between) inspector.look_between(mesh, inspection);
+        inspector.look_between(mesh, inspection);
         tracker_.last_mesh.take(mesh.carved, particles(), cells());
         const bool known = has_topology();
         if (!known) inspector.inspect_topology(mesh, inspection);

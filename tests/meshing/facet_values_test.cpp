@@ -3,11 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
+#include <set>
 
 #include "isotrack/surface/shapes.h"
 #include "meshing/sharpness.h"
+#include "support/meshes.h"
 
 namespace isotrack {
 namespace {
@@ -30,11 +34,50 @@ TEST(FacetValues, AreThoseOfTheSurfaceAtItsPlaces) {
     EXPECT_NEAR(facet.error(), facet.area2 * squares / FacetValues::kPoints, 1e-14);
 }
 
-TEST(FacetValues, OfAFacetWithoutAreaAreNone) {
+TEST(FacetValues, AreAtTheCornersTwiceOnEachEdgeAndInTheMiddle) {
+    std::set<std::array<int, 3>> places;
+    int zeros[3] = {};
+    for (const auto& place : FacetValues::kPlace) {
+        std::array<int, 3> thirds{};
+        for (int k = 0; k < 3; ++k) {
+            thirds[k] = static_cast<int>(std::lround(3.0 * place[k]));
+            EXPECT_NEAR(3.0 * place[k], thirds[k], 1e-15);
+        }
+        places.insert(thirds);
+        ++zeros[std::count(thirds.begin(), thirds.end(), 0)];
+    }
+    EXPECT_EQ(places.size(), 10u);
+    EXPECT_EQ(zeros[0], 1);
+    EXPECT_EQ(zeros[1], 6);
+    EXPECT_EQ(zeros[2], 3);
+}
+
+TEST(FacetValues, OfAFacetWithoutAreaCountNothing) {
     const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
     const FacetValues facet({2, 0, 0}, {3, 0, 0}, {4, 0, 0}, *sphere->probe());
     EXPECT_EQ(facet.normal, Vec3::Zero());
     EXPECT_EQ(facet.error(), 0.0);
+}
+
+TEST(FacetValues, OfAMeshAreThoseOfEachAlone) {
+    const auto ellipsoid = shapes::ellipsoid({0.1, 0.2, 0.3}, {1.0, 0.8, 0.6}, 0.1);
+    TriangleMesh mesh = support::icosphere(2);
+    std::mt19937 random(3);
+    for (Triangle& t : mesh.triangles) std::rotate(t.begin(), t.begin() + random() % 3, t.end());
+    std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), random);
+    mesh.triangles.resize(mesh.triangles.size() - 20);  // some edges have one side
+    mesh.triangles.push_back(mesh.triangles.front());   // some have three
+    const auto facets =
+        facet_values(mesh.points, mesh.triangles, Corners(mesh.points.size(), mesh.triangles), *ellipsoid);
+    ASSERT_EQ(facets.size(), mesh.triangles.size());
+    const auto probe = ellipsoid->probe();
+    for (std::size_t t = 0; t < facets.size(); ++t) {
+        const auto& [i, j, k] = mesh.triangles[t];
+        const FacetValues alone(mesh.points[i], mesh.points[j], mesh.points[k], *probe);
+        EXPECT_EQ(facets[t].value, alone.value);
+        EXPECT_EQ(facets[t].normal, alone.normal);
+        EXPECT_EQ(facets[t].area2, alone.area2);
+    }
 }
 
 TEST(Sharpness, IsAskedForAsItIsCalculated) {

@@ -17,8 +17,9 @@ struct CarvedSurface {
     std::vector<Vec3>
         midpoints;  ///< Positions of the output vertices that stand on no particle: the last ones, in order.
     static constexpr int kNoCell = -1;
-    /// Per triangle: the cell behind it; midpoints split a triangle, both halves keep its cell. kNoCell: it
-    /// is no facet, since it was flipped or belongs to a drop that was put in.
+    /// Per triangle: the cell behind it; midpoints split a triangle, both halves keep its cell, and one that
+    /// is flipped keeps that of the facet in whose place it is. kNoCell: it belongs to a drop that was put
+    /// in.
     std::vector<int> inside_cell;
     std::vector<int> inside_facet;  ///< Per triangle: the index of that cell's vertex opposite the facet.
 

@@ -16,8 +16,8 @@ namespace isotrack {
 /// An edge flips where the error of its two triangles, area times mean square, falls by a tenth or more, and
 /// is at least a quarter of what it is on average; where none of the new ones has an angle below 30 degrees,
 /// or below what the old ones had; where both are within `tolerance` and face the way the surface does, or no
-/// worse than the old ones. `movable`: a flag per vertex; the others stay, and so do triangles that have no
-/// such vertex.
+/// worse than the old ones. What a flip may gain is guessed first, from the values on the old triangles.
+/// `movable`: a flag per vertex; the others stay, and so do the edges of triangles around them.
 ///
 /// Returns the two triangles of each flip, in order. A flip puts its new triangles in the places of the old
 /// and makes no edge that the mesh had at the start, so those that share no triangle with the others can be

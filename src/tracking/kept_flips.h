@@ -1,0 +1,41 @@
+// The flips in one frame's mesh, carried over to the meshes that follow it.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "isotrack/meshing/manifold.h"
+
+namespace isotrack {
+
+/// Flips in groups that share no triangle, so that each group can be taken back alone.
+class KeptFlips {
+public:
+    KeptFlips() = default;
+    /// `flips`: pairs of triangles that, one after the other, made those of `carved` from `before`. All their
+    /// vertices must stand on a particle alone.
+    KeptFlips(const std::vector<std::array<int, 2>>& flips, const std::vector<Triangle>& before,
+              const CarvedSurface& carved);
+
+    /// Puts them into the next mesh, which has none. `now`: of each triangle of the last mesh, which one it
+    /// is there, -1 if none; `vertex`: of each particle, negative if it has not just one there. A group that
+    /// misses one of these is forgotten; what is left of its triangles gets flags in `around`, per vertex.
+    void put_into(CarvedSurface& carved, const std::vector<int>& now, const std::vector<int>& vertex,
+                  std::vector<char>& around);
+    /// Takes back, and forgets, the groups with flagged vertices. Returns whether there were any.
+    bool undo_at(const std::vector<char>& flagged, const std::vector<int>& vertex, CarvedSurface& carved);
+
+private:
+    struct Flipped {
+        int group;
+        int triangle;
+        Triangle before, after;  // of particles
+    };
+    /// `keep` is called with each group, as a range, and says whether it is kept.
+    template <typename Keep>
+    void filter_groups(const Keep& keep);
+
+    std::vector<Flipped> flipped_;  // group by group
+};
+
+}  // namespace isotrack
