@@ -55,7 +55,7 @@ public:
         const double worth = 2.0 * kWorth * std::accumulate(error.begin(), error.end(), 0.0) /
                              static_cast<double>(std::max<std::ptrdiff_t>(1, count));
         constexpr std::size_t kTrianglesPerBlock = 1024;
-        std::vector<Flip> flips = find_in_blocks<Flip>(
+        const std::vector<Flip> flips = find_in_blocks<Flip>(
             triangles_.size(), kTrianglesPerBlock,
             [&](std::size_t begin, std::size_t end, std::vector<Flip>& found) {
                 for (std::size_t t = begin; t < end; ++t)
@@ -63,11 +63,15 @@ public:
                         if (auto flip = flip_of(static_cast<int>(t), k, corners, error, worth))
                             found.push_back(*flip);
             });
-        std::stable_sort(flips.begin(), flips.end(),
-                         [](const Flip& a, const Flip& b) { return a.gain > b.gain; });
+        std::vector<const Flip*> by_gain;
+        by_gain.reserve(flips.size());
+        for (const Flip& flip : flips) by_gain.push_back(&flip);
+        std::stable_sort(by_gain.begin(), by_gain.end(),
+                         [](const Flip* a, const Flip* b) { return a->gain > b->gain; });
         std::vector<char> touched(points_.size(), 0);
         std::vector<std::array<int, 2>> done;
-        for (const Flip& flip : flips) {
+        for (const Flip* best : by_gain) {
+            const Flip& flip = *best;
             const auto is_touched = [&](const Triangle& t) {
                 return std::any_of(t.begin(), t.end(), [&](int v) { return touched[v]; });
             };
@@ -95,6 +99,9 @@ private:
     }
     double sharpness_of(const Triangle& t) const {
         return sharpness(points_[t[0]], points_[t[1]], points_[t[2]]);
+    }
+    bool is_sharp(const Triangle& t) const {
+        return is_sharper(kSharpnessAt30Degrees, points_[t[0]], points_[t[1]], points_[t[2]]);
     }
     double facing(const Triangle& t, Surface::Probe& probe) const {
         return isotrack::facing(points_[t[0]], points_[t[1]], points_[t[2]], probe);
@@ -148,11 +155,12 @@ private:
         const auto [d, other] = corners.beyond(c, b, triangles_);
         if (d < 0 || d == a || !(error[other] > 0.0) || error[t] + error[other] < worth) return {};
         const double before = error[t] + error[other];
-        if (!(expected_error(t, other, a, b, c, d) < kGain * before)) return {};
         const std::array<Triangle, 2> after = {{{a, b, d}, {a, d, c}}};
-        const double blunt_enough =
-            std::max({kSharpnessAt30Degrees, sharpness_of(old), sharpness_of(triangles_[other])});
-        if (!(std::max(sharpness_of(after[0]), sharpness_of(after[1])) <= blunt_enough)) return {};
+        if ((is_sharp(after[0]) || is_sharp(after[1])) &&
+            !(std::max(sharpness_of(after[0]), sharpness_of(after[1])) <=
+              std::max(sharpness_of(old), sharpness_of(triangles_[other]))))
+            return {};
+        if (!(expected_error(t, other, a, b, c, d) < kGain * before)) return {};
         if (is_edge(a, d, corners)) return {};
         Surface::Probe& probe = probes_.local();
         const FacetValues first = facet_of(after[0], probe);
