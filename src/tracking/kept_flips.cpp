@@ -13,6 +13,27 @@ Triangle renamed(const Triangle& t, const std::vector<int>& of_vertex) {
     return {of_vertex[t[0]], of_vertex[t[1]], of_vertex[t[2]]};
 }
 
+using Edges = std::vector<std::pair<int, int>>;  // each from the lower end, ascending
+
+void add_edges(const Triangle& t, Edges& edges) {
+    for (int k = 0; k < 3; ++k) edges.push_back(std::minmax(t[k], t[(k + 1) % 3]));
+}
+bool has(const Edges& edges, const std::pair<int, int>& edge) {
+    return std::binary_search(edges.begin(), edges.end(), edge);
+}
+
+/// Of the triangles that stand for none of the last mesh.
+Edges edges_of_new(const std::vector<Triangle>& triangles, const std::vector<int>& now) {
+    std::vector<char> is_new(triangles.size(), 1);
+    for (const int t : now)
+        if (t >= 0) is_new[t] = 0;
+    Edges result;
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        if (is_new[t]) add_edges(triangles[t], result);
+    std::sort(result.begin(), result.end());
+    return result;
+}
+
 }  // namespace
 
 KeptFlips::KeptFlips(const std::vector<std::array<int, 2>>& flips, const std::vector<Triangle>& before,
@@ -52,11 +73,23 @@ void KeptFlips::filter_groups(const Keep& keep) {
 
 void KeptFlips::put_into(CarvedSurface& carved, const std::vector<int>& now, const std::vector<int>& vertex,
                          std::vector<char>& around) {
+    if (flipped_.empty()) return;
+    const Edges of_new = edges_of_new(carved.triangles, now);
     filter_groups([&](auto from, auto to) {
-        const bool stays = std::all_of(from, to, [&](const Flipped& f) {
+        bool stays = std::all_of(from, to, [&](const Flipped& f) {
             return now[f.triangle] >= 0 &&
                    std::all_of(f.after.begin(), f.after.end(), [&](int p) { return vertex[p] >= 0; });
         });
+        if (stays) {
+            Edges before, after;
+            std::for_each(from, to, [&](const Flipped& f) {
+                add_edges(renamed(f.before, vertex), before);
+                add_edges(renamed(f.after, vertex), after);
+            });
+            std::sort(before.begin(), before.end());
+            stays = std::none_of(after.begin(), after.end(),
+                                 [&](const auto& edge) { return !has(before, edge) && has(of_new, edge); });
+        }
         for (; from != to; ++from) {
             from->triangle = now[from->triangle];
             if (stays)

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 #include <vector>
 
@@ -105,6 +106,28 @@ TEST_F(Strip, ForgetsThoseOfAParticleThatIsOnSeveralVertices) {
     flips.put_into(carved, same, vertex, around);
     for (const int t : {2, 3}) EXPECT_EQ(carved.triangles[t], before[t]);
     for (const int t : {6, 7, 8, 9}) EXPECT_EQ(carved.triangles[t], after[t]);
+}
+
+TEST_F(Strip, ForgetsThoseWhoseEdgeANewTriangleHas) {
+    flip(1);
+    KeptFlips flips({{2, 3}}, before, carved);
+    carved.triangles = before;
+    carved.triangles[7] = {3, 4, 9};  // with the edge that the flip made
+    same[7] = -1;
+    flips.put_into(carved, same, vertex, around);
+    EXPECT_EQ(carved.triangles[2], before[2]);
+    EXPECT_EQ(carved.triangles[3], before[3]);
+    EXPECT_EQ(std::count(around.begin(), around.end(), 1), 4);
+}
+
+TEST_F(Strip, KeepsThoseBesideNewTriangles) {
+    flip(1);
+    const std::vector<Triangle> after = carved.triangles;
+    KeptFlips flips({{2, 3}}, before, carved);
+    carved.triangles = before;
+    for (const int t : {1, 4}) same[t] = -1;  // new ones with an edge of what was flipped
+    flips.put_into(carved, same, vertex, around);
+    EXPECT_EQ(carved.triangles, after);
 }
 
 TEST_F(Strip, TakesBackThoseAtFlaggedVertices) {
