@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kRounds = 2;
 constexpr int kFitSteps = 3;
-// Vertices slide more freely than in a fit of what is meshed again: on to the crease, if it takes some steps.
+// Vertices slide more freely than in a fit: on to the crease, if it takes some steps.
 constexpr double kDamping = 0.001;
 constexpr double kGain = 0.9;    // of the error, at most, for a flip to be worth it
 constexpr double kWorth = 0.25;  // of the mean error of two triangles: less is not looked at

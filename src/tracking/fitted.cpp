@@ -1,8 +1,5 @@
 #include "tracking/fitted.h"
 
-#include <algorithm>
-#include <utility>
-
 #include "isotrack/meshing/fit.h"
 #include "isotrack/meshing/refit.h"
 #include "isotrack/meshing/self_intersections.h"
@@ -11,7 +8,7 @@
 namespace isotrack {
 namespace {
 
-constexpr int kFirstSteps = 3, kNextSteps = 6;  // others follow the flips of the first mesh
+constexpr int kSteps = 6, kStepsBeforeFlips = 3;  // others follow these
 constexpr int kRings = 2;
 
 void add_ring(std::vector<char>& flags, const std::vector<Triangle>& triangles) {
@@ -29,14 +26,19 @@ void Fitted::take(const FrameMesh& mesh, std::size_t particles) {
         if (const int p = mesh.carved.particle[v]; p >= 0) position_[p] = mesh.vertices[v];
 }
 
-void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface, double tolerance) {
+void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface,
+                          std::optional<double> tolerance) {
     auto& triangles = mesh.carved.triangles;
-    const bool is_first = facets_.empty();
     const MeshFacets facets(mesh.carved, mesh.on_surface);
     std::vector<char> movable(mesh.vertices.size(), 0);
     std::vector<int> now(facets_.size(), -1);
+    std::size_t known = 0;
     compare(
-        facets, facets_, [&](std::size_t f, std::size_t old) { now[old] = static_cast<int>(f); },
+        facets, facets_,
+        [&](std::size_t f, std::size_t old) {
+            now[old] = static_cast<int>(f);
+            ++known;
+        },
         [&](std::size_t f, const Facet&) {
             for (const int v : triangles[f]) movable[v] = 1;
         },
@@ -46,16 +48,22 @@ void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface&
     std::vector<char> lone(mesh.vertices.size(), 0);
     for (const int v : vertex)
         if (v >= 0) lone[v] = 1;
+    const bool is_first = 2 * known < triangles.size();
+    if (is_first) {
+        flips_ = {};
+        movable.assign(movable.size(), 1);
+    }
+    flips_.put_into(mesh.carved, now, vertex, movable);
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
         if (!lone[v]) movable[v] = 1;  // where it was is not known
         if (!movable[v]) mesh.vertices[v] = position_[mesh.carved.particle[v]];
     }
-    flips_.put_into(mesh.carved, now, vertex, movable);
     for (int ring = 0; ring < kRings; ++ring) add_ring(movable, triangles);
-    fit(mesh.vertices, triangles, surface, is_first ? kFirstSteps : kNextSteps, movable);
-    if (is_first) {
+    const bool flips = is_first && tolerance;
+    fit(mesh.vertices, triangles, surface, flips ? kStepsBeforeFlips : kSteps, movable);
+    if (flips) {
         const std::vector<Triangle> before = triangles;
-        flips_ = KeptFlips(refit(mesh.vertices, triangles, surface, tolerance, lone), before, mesh.carved);
+        flips_ = KeptFlips(refit(mesh.vertices, triangles, surface, *tolerance, lone), before, mesh.carved);
     }
     for (Vec3& v : mesh.vertices) v = to_float_precision(v);
     take(mesh, particles);
@@ -65,20 +73,20 @@ bool Fitted::undo_crossing(FrameMesh& mesh, std::size_t particles) {
     const std::vector<int> vertex = lone_vertices(mesh, particles);
     std::vector<char> undo(mesh.vertices.size(), 0);
     bool any = false;
-    for (;;) {
+    for (bool changed = true; changed;) {
         const auto crossing = self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}});
         if (crossing.empty()) break;
         any = true;
+        changed = false;
         for (const auto& [t, u] : crossing)
             for (const int of : {t, u})
-                for (const int v : mesh.carved.triangles[of]) undo[v] = 1;
-        bool changed = flips_.undo_at(undo, vertex, mesh.carved);
+                for (const int v : mesh.carved.triangles[of]) {
+                    undo[v] = 1;
+                    changed = changed || mesh.vertices[v] != mesh.on_surface[v];
+                }
+        changed = flips_.undo_at(undo, vertex, mesh.carved) || changed;
         for (std::size_t v = 0; v < undo.size(); ++v)
-            if (undo[v]) {
-                changed = changed || mesh.vertices[v] != mesh.on_surface[v];
-                mesh.vertices[v] = mesh.on_surface[v];
-            }
-        if (!changed) break;
+            if (undo[v]) mesh.vertices[v] = mesh.on_surface[v];
         add_ring(undo, mesh.carved.triangles);
     }
     if (any) take(mesh, particles);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "isotrack/surface/surface.h"
@@ -14,11 +15,14 @@ namespace isotrack {
 /// Where the vertices of the last mesh were fitted to, and which edges were flipped for it.
 class Fitted {
 public:
-    /// Fits the first mesh, and flips edges that keep its triangles from their surface; none of these get
-    /// beyond `tolerance` by a flip. Of the next ones it fits anew what is within two rings of where the mesh
-    /// differs from the last one; the rest goes to where it was, with the same flips. A flipped triangle
-    /// keeps the cell and facet of the one in whose place it is. `particles`: how many there are.
-    void fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface, double tolerance);
+    /// Fits the first mesh, and flips edges that keep its triangles from their surface. `tolerance`: what
+    /// none of these may come to be beyond by a flip; without it none flips. Of the next meshes it fits anew
+    /// what is within two rings of where one differs from the last; the rest goes to where it was, with the
+    /// same flips where all their triangles are there. A mesh of which more than half is new counts as the
+    /// first. A flipped triangle keeps the cell and facet of the one in whose place it is. `particles`: how
+    /// many there are.
+    void fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface,
+                      std::optional<double> tolerance);
 
     /// Puts vertices and edges back where triangles cross others, a ring further each time, until none cross.
     /// Facets of a DT do not. Returns whether any did.

@@ -1,5 +1,7 @@
 #include "tracking/frame_mesh.h"
 
+#include <algorithm>
+
 #include "sampling/compact.h"
 
 namespace isotrack {
@@ -11,6 +13,17 @@ std::vector<int> lone_vertices(const FrameMesh& mesh, std::size_t particles) {
         if (const int p = mesh.carved.particle[v]; p >= 0)
             result[p] = result[p] == kNone ? static_cast<int>(v) : kSeveral;
     return result;
+}
+
+bool is_flipped(const CarvedSurface& carved, std::size_t triangle, const Tetrahedra& cells) {
+    const int cell = carved.inside_cell[triangle];
+    if (cell == CarvedSurface::kNoCell) return false;
+    const auto& facet = Tetrahedra::kFacet[carved.inside_facet[triangle]];
+    const Triangle& t = carved.triangles[triangle];
+    return std::any_of(t.begin(), t.end(), [&](int v) {
+        const int p = carved.particle[v];  // negative at a midpoint, which splits a facet
+        return p >= 0 && std::none_of(facet, facet + 3, [&](int k) { return cells.vertices[cell][k] == p; });
+    });
 }
 
 FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out) {

@@ -22,6 +22,9 @@ inline long euler_of(const FrameMesh& mesh) {
 /// The vertex on each of so many particles; negative if there is none or several.
 std::vector<int> lone_vertices(const FrameMesh& mesh, std::size_t particles);
 
+/// Whether a triangle is on another diagonal than the facet of the DT in whose place it is.
+bool is_flipped(const CarvedSurface& carved, std::size_t triangle, const Tetrahedra& cells);
+
 /// The mesh less the flagged triangles and the vertices that none has then.
 FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out);
 

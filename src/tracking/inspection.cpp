@@ -369,7 +369,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             const int on_ball =
                 cells.vertices[carved.inside_cell[t]][Tetrahedra::kFacet[carved.inside_facet[t]][0]];
             result.push_back({*x, (*x - particles.position[on_ball]).norm()});
-        } else if (is_too_far((*inspection.errors)[t], limits.tolerance)) {
+        } else if (is_too_far((*inspection.errors)[t], limits.tolerance) || is_flipped(carved, t, cells)) {
             double h = limits.max_edge;
             for (const int p : corner)
                 if (p >= 0) h = std::min(h, particles.spacing[p]);

@@ -65,7 +65,7 @@ void KeptFlips::filter_groups(const Keep& keep) {
     for (auto from = flipped_.begin(); from != flipped_.end();) {
         const auto to = std::find_if(from, flipped_.end(),
                                      [&](const Flipped& other) { return other.group != from->group; });
-        if (keep(from, to)) kept = std::move(from, to, kept);
+        if (keep(from, to)) kept = kept == from ? to : std::move(from, to, kept);
         from = to;
     }
     flipped_.erase(kept, flipped_.end());
@@ -101,16 +101,21 @@ void KeptFlips::put_into(CarvedSurface& carved, const std::vector<int>& now, con
     });
 }
 
-bool KeptFlips::undo_at(const std::vector<char>& flagged, const std::vector<int>& vertex,
-                        CarvedSurface& carved) {
+bool KeptFlips::undo_at(std::vector<char>& flagged, const std::vector<int>& vertex, CarvedSurface& carved) {
     const std::size_t count = flipped_.size();
-    filter_groups([&](auto from, auto to) {
-        const bool stays = std::none_of(from, to, [&](const Flipped& f) {
-            return std::any_of(f.after.begin(), f.after.end(), [&](int p) { return flagged[vertex[p]]; });
+    for (std::size_t before = 0; before != flipped_.size();) {  // until no flag hits another group
+        before = flipped_.size();
+        filter_groups([&](auto from, auto to) {
+            const bool stays = std::none_of(from, to, [&](const Flipped& f) {
+                return std::any_of(f.after.begin(), f.after.end(), [&](int p) { return flagged[vertex[p]]; });
+            });
+            for (; !stays && from != to; ++from) {
+                carved.triangles[from->triangle] = renamed(from->before, vertex);
+                for (const int p : from->before) flagged[vertex[p]] = 1;
+            }
+            return stays;
         });
-        for (; !stays && from != to; ++from) carved.triangles[from->triangle] = renamed(from->before, vertex);
-        return stays;
-    });
+    }
     return flipped_.size() < count;
 }
 

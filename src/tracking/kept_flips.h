@@ -22,8 +22,9 @@ public:
     /// misses one of these is forgotten; what is left of its triangles gets flags in `around`, per vertex.
     void put_into(CarvedSurface& carved, const std::vector<int>& now, const std::vector<int>& vertex,
                   std::vector<char>& around);
-    /// Takes back, and forgets, the groups with flagged vertices. Returns whether there were any.
-    bool undo_at(const std::vector<char>& flagged, const std::vector<int>& vertex, CarvedSurface& carved);
+    /// Takes back, and forgets, the groups with flagged vertices, and flags all of theirs. Returns whether
+    /// there were any.
+    bool undo_at(std::vector<char>& flagged, const std::vector<int>& vertex, CarvedSurface& carved);
 
 private:
     struct Flipped {

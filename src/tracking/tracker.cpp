@@ -118,6 +118,12 @@ struct Tracker::Impl {
         return as_in_paper ? UpdateStrategy::Lazy : options.delaunay;
     }
 
+    /// What flips may leave of the tolerance; in the paper's method it has no say.
+    std::optional<double> flips_within(const SizingLimits& l) const {
+        if (options.method == Method::Paper) return std::nullopt;
+        return kCertified * l.tolerance;
+    }
+
     /// Puts those next to each other in memory that are so in space: what looks at neighbours takes a third
     /// less time then.
     void arrange() {
@@ -233,7 +239,7 @@ struct Tracker::Impl {
     void follow(const Surface& surface, const SizingLimits& l, const Pace& pace, bool warm,
                 TrackedFrame& frame);
     void make_room(const Surface& surface, TrackedFrame& frame);
-    void measure(const Surface& surface, double tolerance, TrackedFrame& frame);
+    void measure(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
     void seed(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, double apart,
               TrackedFrame& frame);
     void sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, bool warm,
@@ -246,14 +252,14 @@ struct Tracker::Impl {
 };
 
 /// Meshes the particles, and measures what the next births and deaths go by.
-void Tracker::Impl::measure(const Surface& surface, double tolerance, TrackedFrame& frame) {
+void Tracker::Impl::measure(const Surface& surface, const SizingLimits& l, TrackedFrame& frame) {
     constexpr int kSizingSteps = 3;  // barycentric lattice of the samples: with the centroid
     auto& seconds = frame.seconds;
     tetrahedralise(true, seconds);
     FrameMesh mesh = carve_mesh(surface, seconds);
     if (options.fit) {
         const StageTimer timer(seconds, "fit");
-        Fitted().fit_vertices(mesh, particles.size(), surface, tolerance);
+        Fitted().fit_vertices(mesh, particles.size(), surface, flips_within(l));
     }
     const StageTimer timer(seconds, "size");
     last_mesh.evidence.error = errors_at_particles(
@@ -274,16 +280,16 @@ void Tracker::Impl::seed(const Surface& surface, const CrossingGrid& crossings, 
 /// Rounds of: mesh, measure, follow.
 void Tracker::Impl::sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
                            bool warm, TrackedFrame& frame) {
-    measure(surface, l.tolerance, frame);
+    measure(surface, l, frame);
     // Where flat faces meet nearly all of the mean square is at few particles, and certify adds none for it.
     const bool dense = options.fit && !warm && share_with_error(last_mesh.evidence, l) < kFewWithError;
     if (dense) {
         seed(surface, crossings, l, kDenseSeeds, frame);
-        measure(surface, l.tolerance, frame);
+        measure(surface, l, frame);
     }
     const int rounds = dense ? kDenseRounds : kRounds;
     for (int round = 0; round < rounds; ++round) {
-        if (round > 0) measure(surface, l.tolerance, frame);
+        if (round > 0) measure(surface, l, frame);
         follow(surface, l, dense ? kDenseAtFirst : kAtFirst, warm, frame);
         if (!warm) arrange();
     }
@@ -347,8 +353,8 @@ public:
     /// Meshes the particles. Once, when many have to be added, their surroundings make room for them.
     void mesh_particles();
     /// Adds particles, and changes labels, until the mesh passes or nothing more can be done. The topology,
-    /// which takes longer to look at, is looked at when all else passes, and so is once more what lies
-    /// between crossings.
+    /// which takes longer to look at, is looked at when all else passes, and so is what lies between
+    /// crossings.
     void certify();
     /// Exchanges parts of the mesh for those of the lattice.
     void patch();
@@ -390,7 +396,7 @@ void Tracker::Impl::Making::make_mesh() {
     work_.mesh = tracker_.carve_mesh(work_.surface, seconds);
     if (!options().fit) return;
     const StageTimer timer(seconds, "fit");
-    fitted_.fit_vertices(work_.mesh, particles().size(), work_.surface, work_.limits.tolerance);
+    fitted_.fit_vertices(work_.mesh, particles().size(), work_.surface, tracker_.flips_within(work_.limits));
 }
 
 bool Tracker::Impl::Making::is_thick() const {
@@ -462,7 +468,8 @@ void Tracker::Impl::Making::mend_components() {
             FrameMesh other = tracker_.mesh_of(of_cells, work_.surface);
             if (!options().fit) return other;
             Fitted its_own = fitted_;
-            its_own.fit_vertices(other, particles().size(), work_.surface, work_.limits.tolerance);
+            its_own.fit_vertices(other, particles().size(), work_.surface,
+                                 tracker_.flips_within(work_.limits));
             its_own.undo_crossing(other, particles().size());
             return other;
         };

@@ -108,8 +108,8 @@ print_missed
 echo
 echo "Size, at about the same number of voxels between particles."
 echo
-echo "| particles | active voxels | tolerance, voxels | seconds, without read | particles per second | peak memory above the grid and the program, bytes per particle | with --fit: particles | seconds | of these the fit | particles per second |"
-echo "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
+echo "| particles | active voxels | tolerance, voxels | seconds, without read | particles per second | peak memory above the grid and the program, bytes per particle | with --fit: particles | seconds | of these the fit | particles per second | bytes per particle |"
+echo "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
 sizes="5000 16000 50000 160000"
 [ "$large" = 0 ] || sizes="$sizes 500000"
 for size in $sizes; do
@@ -124,14 +124,15 @@ for size in $sizes; do
         NR == 4 { for (i = 1; i <= NF; i++) fitted[fitted_name[i]] = $i }
         END {
             rate = value["particles"] / value["advance"]; fitted_rate = fitted["particles"] / fitted["advance"]
-            printf "| %d | %d | %.2f | %.2f | %d | %d | %d | %.2f | %.2f | %d |\n", value["particles"], value["voxels"], tolerance,
-                   value["advance"], rate, 1048576 * value["above_mb"] / value["particles"], fitted["particles"], fitted["advance"],
-                   fitted["fit"], fitted_rate
+            bytes = 1048576 * value["above_mb"] / value["particles"]
+            fitted_bytes = 1048576 * fitted["above_mb"] / fitted["particles"]
+            printf "| %d | %d | %.2f | %.2f | %d | %d | %d | %.2f | %.2f | %d | %d |\n", value["particles"], value["voxels"], tolerance,
+                   value["advance"], rate, bytes, fitted["particles"], fitted["advance"], fitted["fit"], fitted_rate, fitted_bytes
             miss(value["not_kept"] + fitted["not_kept"] > 0, sprintf("%d particles: tolerance not kept", value["particles"]))
             miss(rate < 60000, sprintf("%d particles: %d per second", value["particles"], rate))
             miss(fitted_rate < 60000, sprintf("%d particles with --fit: %d per second", fitted["particles"], fitted_rate))
-            bytes = 1048576 * value["above_mb"] / value["particles"]
             miss(bytes > 1500, sprintf("%d particles: %d bytes each", value["particles"], bytes))
+            miss(fitted_bytes > 1500, sprintf("%d particles with --fit: %d bytes each", fitted["particles"], fitted_bytes))
         }'
 done
 echo

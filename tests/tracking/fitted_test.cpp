@@ -85,6 +85,22 @@ TEST_P(FitOfABox, MovesVerticesAndFlipsEdges) {
     EXPECT_EQ(first.carved.inside_cell, unfitted.carved.inside_cell);
 }
 
+TEST_P(FitOfABox, FlipsNothingWithoutATolerance) {
+    FrameMesh mesh = unfitted;
+    Fitted other;
+    other.fit_vertices(mesh, particles, *box, std::nullopt);
+    EXPECT_EQ(mesh.carved.triangles, unfitted.carved.triangles);
+    EXPECT_LT(squared_error(mesh, *box), squared_error(unfitted, *box));
+}
+
+TEST_P(FitOfABox, TellsFlippedTriangles) {
+    for (std::size_t t = 0; t < first.carved.triangles.size(); ++t) {
+        EXPECT_EQ(is_flipped(first.carved, t, carved.cells),
+                  first.carved.triangles[t] != unfitted.carved.triangles[t]);
+        EXPECT_FALSE(is_flipped(unfitted.carved, t, carved.cells));
+    }
+}
+
 TEST_P(FitOfABox, IsTheSameWhereTheMeshIs) {
     FrameMesh again = unfitted;
     fitted.fit_vertices(again, particles, *box, tolerance);

@@ -446,6 +446,24 @@ TEST(Tracker, MayFollowTheParticlesInAnyWay) {
         }
 }
 
+TEST(Tracker, MayFitInAnyWay) {
+    TrackerOptions options = with_tolerance(0.02);
+    options.fit = true;
+    for (const Method method : {Method::Tolerance, Method::Paper})
+        for (const UpdateStrategy strategy :
+             {UpdateStrategy::Auto, UpdateStrategy::Rebuild, UpdateStrategy::Lazy, UpdateStrategy::Move}) {
+            options.method = method;
+            options.delaunay = strategy;
+            Tracker tracker(options);
+            for (int f = 0; f < 2; ++f) {
+                const TrackedFrame frame =
+                    tracker.advance(*shapes::ellipsoid({0.03 * f, 0, 0}, {1.0, 0.7, 0.45}, kVoxel));
+                expect_sound(frame, 1, 2, std::string(name_of(strategy)) + " frame " + std::to_string(f));
+                EXPECT_TRUE(frame.within_tolerance || method == Method::Paper);
+            }
+        }
+}
+
 TEST(Tracker, GivesEveryShapeItsTopology) {
     const auto near = shapes::unite(
         {shapes::sphere(Vec3(-0.44, 0, 0), 0.4, 0.04), shapes::sphere(Vec3(0.44, 0, 0), 0.4, 0.04)});

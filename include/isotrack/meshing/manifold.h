@@ -18,8 +18,7 @@ struct CarvedSurface {
         midpoints;  ///< Positions of the output vertices that stand on no particle: the last ones, in order.
     static constexpr int kNoCell = -1;
     /// Per triangle: the cell behind it; midpoints split a triangle, both halves keep its cell, and one that
-    /// is flipped keeps that of the facet in whose place it is. kNoCell: it belongs to a drop that was put
-    /// in.
+    /// is flipped keeps that of the facet in whose place it is. kNoCell: it was put in later.
     std::vector<int> inside_cell;
     std::vector<int> inside_facet;  ///< Per triangle: the index of that cell's vertex opposite the facet.
 
