@@ -36,9 +36,10 @@ constexpr double kFlat = 1e-3;             // twice the area over the square of 
 constexpr std::size_t kMostFailing = 64, kMostPlaces = 300;
 constexpr int kMostPatches = 1000, kMostTooFar = 50, kMostRefused = 50;  // see Effort
 constexpr std::size_t kMostTriangles = 10000000;                         // of the whole meshes they make
-constexpr std::size_t kMostEverywhere = 20000;                           // places all over a mesh
-constexpr long kMostAstray = 30;               // components and handles, to look for them there
-constexpr std::size_t kMostPairs = 100000000;  // of components
+constexpr double kLikelyShare = 0.8;            // of patches and area, for places that are likely
+constexpr std::size_t kMostEverywhere = 20000;  // places all over a mesh
+constexpr long kMostAstray = 30;                // components and handles, to look for them there
+constexpr std::size_t kMostPairs = 100000000;   // of components
 
 /// Those of some places that are not near to one before; of very many the first.
 std::vector<Vec3> apart(const std::vector<Vec3>& places, double distance,
@@ -204,8 +205,8 @@ struct Effort {
     std::size_t triangles = 0;  // of the whole meshes that are made
     bool anywhere = false;      // whether all of the mesh was looked at
 
-    bool is_enough() const {
-        return patches >= kMostPatches || area > kMostArea || too_far >= kMostTooFar ||
+    bool is_enough(double share = 1.0) const {
+        return patches >= share * kMostPatches || area > share * kMostArea || too_far >= kMostTooFar ||
                refused >= kMostRefused || triangles > kMostTriangles;
     }
 };
@@ -308,14 +309,15 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
             now = then;
         }
     };
+    double share = kLikelyShare;  // of the effort
     const auto patch_near = [&](const std::vector<Vec3>& some, long worse) {
         for (const double reach : kReaches)
             for (const Vec3& place : some)
-                if (now > 0 && !effort.is_enough()) patch_at(place, reach, now + worse);
+                if (now > 0 && !effort.is_enough(share)) patch_at(place, reach, now + worse);
         patcher->try_again();
     };
     const auto search = [&](std::vector<Vec3> some) {
-        if (some.empty() || now == 0 || effort.is_enough()) return;
+        if (some.empty() || now == 0 || effort.is_enough(share)) return;
         if (some.size() > kMostPlaces) some.resize(kMostPlaces);
         patcher = std::make_unique<Patcher>(trials, some, surface, effort);
         around.clear();
@@ -328,6 +330,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         patch_near(some, -1);
     };
     search(likely);
+    share = 1.0;
     if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true))
         search(places_anywhere(trials.mesh(), surface, now));
     search(places);
