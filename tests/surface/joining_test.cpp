@@ -15,11 +15,27 @@
 #include "isotrack/meshing/lattice_topology.h"
 #include "isotrack/surface/level_set.h"
 #include "support/meshes.h"
+#include "surface/ambiguous_faces.h"
 
 namespace isotrack {
 namespace {
 
 using openvdb::Coord;
+
+TEST(InsideCorners, AreThoseWithValuesBelowZero) {
+    const float some[] = {-1.0f, 1.0f, 0.0f, -0.0f, -1e-45f, std::nanf(""), -INFINITY, INFINITY};
+    std::mt19937 random(5);
+    for (int trial = 0; trial < 1000; ++trial) {
+        float values[2][2][2];
+        unsigned expected = 0;
+        for (unsigned c = 0; c < 8; ++c) {
+            const float value = some[random() % 8];
+            values[c >> 2][c >> 1 & 1][c & 1] = value;
+            if (value < 0.0f) expected += 1u << c;
+        }
+        EXPECT_EQ(inside_corners(values), expected);
+    }
+}
 
 /// Random values at nodes, with outside around them.
 openvdb::FloatGrid::Ptr random_grid(unsigned seed, int nodes, double share_inside, float least = 0.02f,
