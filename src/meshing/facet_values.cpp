@@ -1,10 +1,9 @@
 #include "meshing/facet_values.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstddef>
 
+#include "parallel_for_each.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -25,13 +24,6 @@ constexpr int kOnEdge[3][2] = {{number_of(2, 1), number_of(1, 2)},
                                {number_of(0, 2), number_of(0, 1)},
                                {number_of(1, 0), number_of(2, 0)}};
 
-template <typename Body>
-void for_each(std::size_t count, const Body& body) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kGrain), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
-    });
-}
-
 }  // namespace
 
 std::vector<FacetValues> facet_values(const std::vector<Vec3>& vertices,
@@ -43,7 +35,7 @@ std::vector<FacetValues> facet_values(const std::vector<Vec3>& vertices,
         const auto& [i, j, k] = triangles[t];
         facets[t].value[n] = probe.value(FacetValues::place(n, vertices[i], vertices[j], vertices[k]));
     };
-    for_each(triangles.size(), [&](std::size_t t) {
+    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         const auto& [i, j, k] = triangles[t];
         facets[t] = {vertices[i], vertices[j], vertices[k]};
         Surface::Probe& probe = probes.local();
@@ -52,7 +44,7 @@ std::vector<FacetValues> facet_values(const std::vector<Vec3>& vertices,
             if (triangles[t][(opposite + 1) % 3] < triangles[t][(opposite + 2) % 3])
                 for (const int n : kOnEdge[opposite]) read(t, n, probe);
     });
-    for_each(triangles.size(), [&](std::size_t t) {
+    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         Surface::Probe& probe = probes.local();
         for (int opposite = 0; opposite < 3; ++opposite) {
             const auto& on_edge = kOnEdge[opposite];
@@ -69,7 +61,7 @@ std::vector<FacetValues> facet_values(const std::vector<Vec3>& vertices,
             facets[t].value[on_edge[1]] = facets[other].value[theirs[0]];
         }
     });
-    for_each(vertices.size(), [&](std::size_t v) {
+    parallel_for_each(vertices.size(), kGrain, [&](std::size_t v) {
         const int first = corners.first[v], end = corners.first[v + 1];
         if (first == end) return;
         const double value = probes.local().value(vertices[v]);

@@ -57,8 +57,8 @@ struct FacetValues {
 };
 
 /// Those of all triangles. What they have in common is read once: values at a vertex, and on an edge that is
-/// in both directions. `corners`: of the triangles. The values are
-/// those of each alone, but for rounding. Uses TBB inside; same result at any thread count.
+/// in both directions. `corners`: of the triangles. The values are those of each alone, but for rounding.
+/// Uses TBB inside; same result at any thread count.
 std::vector<FacetValues> facet_values(const std::vector<Vec3>& vertices,
                                       const std::vector<Triangle>& triangles, const Corners& corners,
                                       const Surface& surface);

@@ -1,7 +1,5 @@
 #include "meshing/fit_steps.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
@@ -10,6 +8,7 @@
 #include <limits>
 
 #include "meshing/sharpness.h"
+#include "parallel_for_each.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -81,20 +80,13 @@ bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const
     return sharpness(a_to, b_to, c_to) > sharpness(a, b, c);
 }
 
-template <typename Body>
-void for_each(std::size_t count, std::size_t grain, const Body& body) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
-    });
-}
-
 /// Shortens the steps around triangles that they spoil, and takes them back where that is not enough.
 void undo_spoilt(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                  const Corners& corners, const std::vector<int>& moving, std::vector<Vec3>& to) {
     std::vector<char> bad(triangles.size(), 0), back(vertices.size(), 1);
     for (int pass = 0;; ++pass) {
         std::atomic<bool> any = false;
-        for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
+        parallel_for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
             const auto& [i, j, k] = triangles[t];
             if (!back[i] && !back[j] && !back[k]) return;  // it was good, or no corner of it moves
             bad[t] = spoilt(vertices[i], vertices[j], vertices[k], to[i], to[j], to[k]);
@@ -102,7 +94,7 @@ void undo_spoilt(const std::vector<Vec3>& vertices, const std::vector<Triangle>&
         });
         if (!any) return;
         if (pass == 0) std::fill(back.begin(), back.end(), 0);
-        for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
+        parallel_for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
             const int v = moving[m];
             back[v] = 0;
             for (int e = corners.first[v]; e < corners.first[v + 1] && !back[v]; ++e)
@@ -124,7 +116,7 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
 
     std::vector<Mat3> inverse(moving.size());  // of the quadrics, zero without one
     std::vector<char> creased(vertices.size(), 0);
-    for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
+    parallel_for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
         const int v = moving[m];
         Mat3 quadric = Mat3::Zero();
         Vec3 sum = Vec3::Zero();
@@ -142,7 +134,7 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
     std::vector<Vec3> to = vertices;
     ThreadProbes probes(surface);
     for (int step = 0; step < steps; ++step) {
-        for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
+        parallel_for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
             const int v = moving[m];
             Vec3 pull = Vec3::Zero();
             double shortest2 = std::numeric_limits<double>::infinity();
@@ -159,7 +151,7 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
         });
         undo_spoilt(vertices, triangles, corners, moving, to);
         if (step + 1 < steps)
-            for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
+            parallel_for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
                 const auto& [i, j, k] = triangles[t];
                 const auto way = [&](int v) { return shares[t].normal.dot(to[v] - vertices[v]); };
                 if (creased[i] || creased[j] || creased[k])

@@ -1,12 +1,11 @@
 #include "tracking/between_crossings.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
 
 #include "find_in_blocks.h"
+#include "parallel_for_each.h"
 #include "tracking/failing.h"
 
 namespace isotrack {
@@ -21,17 +20,12 @@ constexpr double kFarther = 0.1, kFartherAtFolds = 0.45;
 constexpr double kStandsForWithin = 0.5, kStandsForOnFlat = 2.0;
 constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
 
-template <typename Body>
-void for_each_index(std::size_t count, const Body& body) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1024), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
-    });
-}
+constexpr std::size_t kGrain = 1024;
 
 /// Flags for the vertices where triangles meet at an angle.
 std::vector<char> folded_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles) {
     std::vector<Eigen::Vector3f> area(triangles.size());
-    for_each_index(triangles.size(), [&](std::size_t t) {
+    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         const auto& [i, j, k] = triangles[t];
         area[t] = (vertices[j] - vertices[i]).cross(vertices[k] - vertices[i]).cast<float>();
     });
@@ -39,7 +33,7 @@ std::vector<char> folded_vertices(const std::vector<Vec3>& vertices, const std::
     for (std::size_t t = 0; t < triangles.size(); ++t)
         for (const int v : triangles[t]) sum[v] += area[t];
     std::vector<std::array<char, 3>> folded(triangles.size());  // at each corner
-    for_each_index(triangles.size(), [&](std::size_t t) {
+    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         for (int k = 0; k < 3; ++k) {
             const Eigen::Vector3f& normal = sum[triangles[t][k]];
             folded[t][k] = !(area[t].dot(normal) >= kFold * area[t].norm() * normal.norm());
@@ -59,7 +53,7 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
     std::vector<std::atomic<char>> at_fold(crossings_.size());
     const std::vector<char> folded = folded_vertices(vertices, triangles);
     const Vec3 reach = Vec3::Constant(tolerance_);
-    for_each_index(triangles.size(), [&](std::size_t t) {
+    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         const auto& [i, j, k] = triangles[t];
         if (!folded[i] && !folded[j] && !folded[k]) return;
         Box box;

@@ -45,9 +45,7 @@ void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface&
         [](std::size_t) {});
     facets.write_to(facets_);
     const std::vector<int> vertex = lone_vertices(mesh, particles);
-    std::vector<char> lone(mesh.vertices.size(), 0);
-    for (const int v : vertex)
-        if (v >= 0) lone[v] = 1;
+    const std::vector<char> lone = lone_flags(mesh, vertex);
     const bool is_first = 2 * known < triangles.size();
     if (is_first) {
         flips_ = {};

@@ -15,6 +15,13 @@ std::vector<int> lone_vertices(const FrameMesh& mesh, std::size_t particles) {
     return result;
 }
 
+std::vector<char> lone_flags(const FrameMesh& mesh, const std::vector<int>& lone_vertices) {
+    std::vector<char> result(mesh.vertices.size(), 0);
+    for (const int v : lone_vertices)
+        if (v >= 0) result[v] = 1;
+    return result;
+}
+
 bool is_flipped(const CarvedSurface& carved, std::size_t triangle, const Tetrahedra& cells) {
     const int cell = carved.inside_cell[triangle];
     if (cell == CarvedSurface::kNoCell) return false;

@@ -21,6 +21,8 @@ inline long euler_of(const FrameMesh& mesh) {
 
 /// The vertex on each of so many particles; negative if there is none or several.
 std::vector<int> lone_vertices(const FrameMesh& mesh, std::size_t particles);
+/// Flags for these, per vertex: the others are copies, and what stands on no particle.
+std::vector<char> lone_flags(const FrameMesh& mesh, const std::vector<int>& lone_vertices);
 
 /// Whether a triangle is on another diagonal than the facet of the DT in whose place it is.
 bool is_flipped(const CarvedSurface& carved, std::size_t triangle, const Tetrahedra& cells);

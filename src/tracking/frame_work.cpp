@@ -15,14 +15,6 @@ constexpr double kChangedShare = 0.96;  // of the tolerance, for the triangles t
 
 }  // namespace
 
-/// The vertices that stand for a particle alone: copies stay where they are.
-std::vector<char> FrameWork::movable() const {
-    std::vector<char> result(mesh.vertices.size(), 0);
-    for (const int v : lone_vertices(mesh, frame.particles))
-        if (v >= 0) result[v] = 1;
-    return result;
-}
-
 /// Makes sharp triangles blunter. The particles stay where they are: the next frame's triangles are others.
 void FrameWork::blunt() {
     const StageTimer timer(frame.seconds, "blunt");
@@ -37,7 +29,8 @@ void FrameWork::blunt() {
     for (const TriangleError& error : *inspection.errors) farthest_before.push_back(error.largest);
     const std::vector<Vec3> vertices_before = mesh.vertices;
     const std::vector<Triangle> triangles_before = mesh.carved.triangles;
-    Blunter blunter(mesh.vertices, mesh.carved.triangles, movable(), surface, reached,
+    Blunter blunter(mesh.vertices, mesh.carved.triangles,
+                    lone_flags(mesh, lone_vertices(mesh, frame.particles)), surface, reached,
                     kChangedShare * limits.tolerance, limits.detail);
     // Where changed triangles are beyond the tolerance and farther off than those they stand for, and what is
     // missed that was not before.

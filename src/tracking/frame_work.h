@@ -26,7 +26,6 @@ struct FrameWork {
     TrackedFrame finish(const TrackerOptions& options);
 
 private:
-    std::vector<char> movable() const;
     void blunt();
 };
 
