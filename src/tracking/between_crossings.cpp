@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 
 #include "find_in_blocks.h"
 #include "parallel_for_each.h"
@@ -13,17 +14,21 @@ namespace {
 
 // Of a crossing whose surroundings are looked at: of the tolerance; or so many spacings of the crossings less
 // than it, as the surface between them may be farther off. The larger counts. Where the spacing grows with
-// the tolerance, from a voxel on, that is 0.9 and 0.55 of it; where it does not, nothing is in doubt at last.
+// the tolerance, from a voxel on, that is 0.9 and, at folds, 0.5 to 0.8 of it; where it does not, nothing is
+// in doubt at last. On the inner side of a fold the middle between two crossings, each near a triangle of its
+// own, is at most half the way between them times the sine of half the angle between the normals farther off.
 constexpr double kNearlyTooFar = 0.8, kNearlyAtFolds = 0.1;
-constexpr double kFarther = 0.1, kFartherAtFolds = 0.45;
+constexpr double kFarther = 0.1, kFartherAtFolds = 0.5;  // the latter times that sine
 // Spacings: so far around lie those that a crossing stands for.
 constexpr double kStandsForWithin = 0.5, kStandsForOnFlat = 2.0;
 constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
 
 constexpr std::size_t kGrain = 1024;
 
-/// Flags for the vertices where triangles meet at an angle.
-std::vector<char> folded_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles) {
+/// For each vertex the sine of the largest angle between the normal of a triangle there and its own, 0 where
+/// they meet nearly flat.
+std::vector<float> turns_at_vertices(const std::vector<Vec3>& vertices,
+                                     const std::vector<Triangle>& triangles) {
     std::vector<Eigen::Vector3f> area(triangles.size());
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         const auto& [i, j, k] = triangles[t];
@@ -32,16 +37,17 @@ std::vector<char> folded_vertices(const std::vector<Vec3>& vertices, const std::
     std::vector<Eigen::Vector3f> sum(vertices.size(), Eigen::Vector3f::Zero());
     for (std::size_t t = 0; t < triangles.size(); ++t)
         for (const int v : triangles[t]) sum[v] += area[t];
-    std::vector<std::array<char, 3>> folded(triangles.size());  // at each corner
+    std::vector<std::array<float, 3>> turn(triangles.size());  // at each corner
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         for (int k = 0; k < 3; ++k) {
             const Eigen::Vector3f& normal = sum[triangles[t][k]];
-            folded[t][k] = !(area[t].dot(normal) >= kFold * area[t].norm() * normal.norm());
+            const float cosine = area[t].dot(normal) / (area[t].norm() * normal.norm());
+            turn[t][k] = cosine >= kFold ? 0.0f : cosine > 0.0f ? std::sqrt(1.0f - cosine * cosine) : 1.0f;
         }
     });
-    std::vector<char> result(vertices.size(), 0);
+    std::vector<float> result(vertices.size(), 0.0f);
     for (std::size_t t = 0; t < triangles.size(); ++t)
-        for (int k = 0; k < 3; ++k) result[triangles[t][k]] |= folded[t][k];
+        for (int k = 0; k < 3; ++k) result[triangles[t][k]] = std::max(result[triangles[t][k]], turn[t][k]);
     return result;
 }
 
@@ -50,30 +56,31 @@ std::vector<char> folded_vertices(const std::vector<Vec3>& vertices, const std::
 std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>& vertices,
                                                         const std::vector<Triangle>& triangles,
                                                         const MeshDistances& at_crossings) {
-    std::vector<std::atomic<char>> at_fold(crossings_.size());
-    const std::vector<char> folded = folded_vertices(vertices, triangles);
+    std::vector<std::atomic<char>> at_fold(crossings_.size());  // and nearly too far off for it
+    const std::vector<float> turns = turns_at_vertices(vertices, triangles);
+    const double spacing = crossings_.spacing();
     const Vec3 reach = Vec3::Constant(tolerance_);
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         const auto& [i, j, k] = triangles[t];
-        if (!folded[i] && !folded[j] && !folded[k]) return;
+        const double turn = std::max({turns[i], turns[j], turns[k]});
+        if (turn == 0.0) return;
+        const double nearly =
+            std::max(kNearlyAtFolds * tolerance_, tolerance_ - kFartherAtFolds * turn * spacing);
         Box box;
         for (const int v : triangles[t]) box.extend(vertices[v]);
-        crossings_.for_each_in(Box(box.min() - reach, box.max() + reach),
-                               [&](std::size_t c) { at_fold[c].store(1, std::memory_order_relaxed); });
+        crossings_.for_each_in(Box(box.min() - reach, box.max() + reach), [&](std::size_t c) {
+            if (at_crossings[c] > nearly) at_fold[c].store(1, std::memory_order_relaxed);
+        });
     });
     looked_at_.resize(crossings_.size(), 0);
-    const double spacing = crossings_.spacing();
-    const double nearly = std::max(kNearlyTooFar * tolerance_, tolerance_ - kFarther * spacing),
-                 nearly_at_folds =
-                     std::max(kNearlyAtFolds * tolerance_, tolerance_ - kFartherAtFolds * spacing);
+    const double nearly = std::max(kNearlyTooFar * tolerance_, tolerance_ - kFarther * spacing);
     constexpr std::size_t kBlock = 32768;
     const auto doubtful = find_in_blocks<int>(
         crossings_.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
             for (std::size_t c = begin; c < end; ++c) {
                 const double d = at_crossings[c];
                 if (looked_at_[c] || d > kCertified * tolerance_) continue;
-                const bool fold = at_fold[c] && !crossings_[c].flat;
-                if (!(d > (fold ? nearly_at_folds : nearly))) continue;
+                if (!(d > nearly || (at_fold[c] && !crossings_[c].flat))) continue;
                 looked_at_[c] = 1;
                 found.push_back(static_cast<int>(c));
             }
