@@ -276,12 +276,26 @@ private:
 
 }  // namespace
 
+FacingTriangle::FacingTriangle(const Vec3& a, const Vec3& b, const Vec3& c)
+    : corner_{a, b, c}, normal_((b - a).cross(c - a).normalized()) {
+    for (int k = 0; k < 3; ++k) {
+        out_[k] = (corner_[(k + 1) % 3] - corner_[k]).cross(normal_);
+        length2_[k] = out_[k].squaredNorm();
+    }
+}
+
 double FacingTriangle::squared_distance(const Surface::Crossing& crossing, double limit) const {
     constexpr double kInfinite = std::numeric_limits<double>::infinity();
-    const double off_plane = normal_.dot(crossing.point - a_);
-    if (off_plane * off_plane > limit || normal_.dot(crossing.outward.cast<double>()) < kStandsFor)
-        return kInfinite;
-    return isotrack::squared_distance(crossing.point, a_, b_, c_);
+    const double off_plane = normal_.dot(crossing.point - corner_[0]), off_plane2 = off_plane * off_plane;
+    if (off_plane2 > limit || normal_.dot(crossing.outward.cast<double>()) < kStandsFor) return kInfinite;
+    bool over = true;  // the triangle, and not one without area
+    for (int k = 0; k < 3; ++k) {
+        const double out = out_[k].dot(crossing.point - corner_[k]);  // times the length of the edge
+        if (out > 0.0 && out * out > (limit - off_plane2) * length2_[k]) return kInfinite;
+        over = over && out < 0.0;
+    }
+    if (over) return off_plane2;
+    return isotrack::squared_distance(crossing.point, corner_[0], corner_[1], corner_[2]);
 }
 
 namespace {

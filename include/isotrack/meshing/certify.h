@@ -73,14 +73,15 @@ std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec
 /// sheet does not stand for the other.
 class FacingTriangle {
 public:
-    FacingTriangle(const Vec3& a, const Vec3& b, const Vec3& c)
-        : a_(a), b_(b), c_(c), normal_((b - a).cross(c - a).normalized()) {}
+    FacingTriangle(const Vec3& a, const Vec3& b, const Vec3& c);
     /// Squared distance to a crossing; infinite when the triangle faces another way, and perhaps when it is
     /// above `limit`.
     double squared_distance(const Surface::Crossing& crossing, double limit) const;
 
 private:
-    Vec3 a_, b_, c_, normal_;
+    Vec3 corner_[3], normal_;
+    Vec3 out_[3];        // in the plane, from the edge after each corner away from the triangle
+    double length2_[3];  // of these, and so of the edges
 };
 
 /// Distance of every lattice crossing of the surface to the nearest triangle that stands for it. In the order
