@@ -29,7 +29,8 @@ constexpr double kApart = 1.5;    // places that near are one
 constexpr double kCovered = 2.0;  // so far apart they leave nothing out
 constexpr double kAround = 2.5;   // the middles of other patches for what fails
 constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
-constexpr double kLatticeReach = 24.0;
+constexpr double kTriedReach = 24.0,
+                 kLookReach = 14.0;  // of the lattice, around places that are tried, looked at
 constexpr double kMostArea = 50000.0,
                  kMostAreaOfPlace = 50.0;  // square: what goes, for all patches, for one
 constexpr double kFlat = 1e-3;             // twice the area over the square of the longest edge
@@ -160,36 +161,16 @@ std::vector<Vec3> other_places(const FrameMesh& mesh, const Surface& surface) {
     return apart(result, kApart * resolution, kMostPlaces);
 }
 
-/// Those of some places where a patch would change the numbers; where none fits, too, if `or_unfit`.
-std::vector<Vec3> unlike(const std::vector<Vec3>& places, const FrameMesh& mesh, const Surface& surface,
-                         bool or_unfit) {
-    if (places.empty()) return {};
-    const double resolution = surface.resolution();
-    PatchSource lattice(surface.lattice_mesh(places, 4.0 * kSmall * resolution), resolution);
-    const TriangleBins bins(mesh.vertices, mesh.carved.triangles, resolution);
-    std::vector<char> is_unlike(places.size());
-    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
-        const auto patch = patch_for(triangles_around(places[p], kSmall * resolution, bins), bins, lattice);
-        is_unlike[p] = patch ? patch->euler != 0 || patch->components != 0 : or_unfit;
-    });
-    std::vector<Vec3> result = places;
-    compact(result, is_unlike);
-    return result;
-}
-
-/// Where the mesh may have another topology than the lattice although nothing tells. All of a mesh is looked
-/// at where it is not too large, nor its triangles: what goes of the lattice then is large as well.
-std::vector<Vec3> places_anywhere(const FrameMesh& mesh, const Surface& surface, long astray) {
-    const double resolution = surface.resolution();
-    if (astray <= kMostAstray) {
-        const std::vector<Vec3> all = apart(mesh.vertices, kCovered * resolution, kMostEverywhere + 1);
-        std::vector<int> triangles(mesh.carved.triangles.size());
-        std::iota(triangles.begin(), triangles.end(), 0);
-        const double area = area_of(triangles, mesh) / (resolution * resolution);
-        if (all.size() <= kMostEverywhere && area <= kMostAreaOfPlace * static_cast<double>(all.size()))
-            return unlike(all, mesh, surface, false);
-    }
-    return other_places(mesh, surface);
+/// Places all over a mesh that leave nothing of it out. None where there are too many, or where the triangles
+/// are so large that what goes of the lattice would be, too.
+std::vector<Vec3> places_everywhere(const FrameMesh& mesh, double resolution) {
+    std::vector<Vec3> all = apart(mesh.vertices, kCovered * resolution, kMostEverywhere + 1);
+    std::vector<int> triangles(mesh.carved.triangles.size());
+    std::iota(triangles.begin(), triangles.end(), 0);
+    const double area = area_of(triangles, mesh) / (resolution * resolution);
+    if (all.size() > kMostEverywhere || area > kMostAreaOfPlace * static_cast<double>(all.size()))
+        all.clear();
+    return all;
 }
 
 bool is_sound(const MeshTopology& topology) {
@@ -214,11 +195,27 @@ struct Effort {
 /// Patches of one mesh, which becomes another where one is taken; near some places alone.
 class Patcher {
 public:
-    Patcher(MeshTrials& trials, const std::vector<Vec3>& places, const Surface& surface, Effort& effort)
+    /// `lattice_reach`: resolutions around the places.
+    Patcher(MeshTrials& trials, const std::vector<Vec3>& places, double lattice_reach, const Surface& surface,
+            Effort& effort)
         : trials_(trials),
           effort_(effort),
           resolution_(surface.resolution()),
-          lattice_(surface.lattice_mesh(places, kLatticeReach * resolution_), resolution_) {}
+          lattice_(surface.lattice_mesh(places, lattice_reach * resolution_), resolution_) {}
+
+    /// Those of some places where a patch would change the numbers; where none fits, too, if `or_unfit`.
+    std::vector<Vec3> unlike(const std::vector<Vec3>& places, bool or_unfit) {
+        const TriangleBins& bins = bins_of_mesh();
+        std::vector<char> is_unlike(places.size());
+        tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
+            const auto patch =
+                patch_for(triangles_around(places[p], kSmall * resolution_, bins), bins, lattice_);
+            is_unlike[p] = patch ? patch->euler != 0 || patch->components != 0 : or_unfit;
+        });
+        std::vector<Vec3> result = places;
+        compact(result, is_unlike);
+        return result;
+    }
 
     /// Patches that were tried count as new.
     void try_again() { tried_.clear(); }
@@ -235,12 +232,12 @@ public:
     std::optional<bool> patch_at(const Vec3& place, double reach, const IsWanted& is_wanted,
                                  const AreWanted& are_wanted, const TryMesh& try_mesh) {
         const FrameMesh& mesh = trials_.mesh();
-        if (!bins_) bins_.emplace(mesh.vertices, mesh.carved.triangles, 0.5 * resolution_);
-        std::vector<int> gone = triangles_around(place, reach * resolution_, *bins_);
+        const TriangleBins& bins = bins_of_mesh();
+        std::vector<int> gone = triangles_around(place, reach * resolution_, bins);
         if (tried_.count(gone) > 0) return false;
         ++effort_.patches;
         effort_.area += area_of(gone, mesh) / (resolution_ * resolution_);
-        const auto patch = patch_for(gone, *bins_, lattice_);
+        const auto patch = patch_for(gone, bins, lattice_);
         tried_.insert(std::move(gone));
         if (!patch || !is_wanted(*patch)) return false;
         const std::vector<Vec3> corners = corners_of(*patch, mesh);
@@ -262,6 +259,12 @@ public:
     }
 
 private:
+    const TriangleBins& bins_of_mesh() {
+        const FrameMesh& mesh = trials_.mesh();
+        if (!bins_) bins_.emplace(mesh.vertices, mesh.carved.triangles, 0.5 * resolution_);
+        return *bins_;
+    }
+
     MeshTrials& trials_;
     Effort& effort_;
     const double resolution_;
@@ -289,10 +292,14 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     if (now == 0) return 0;
     const auto wanted = surface.lattice_components();
     if (!wanted) return 0;
-    std::vector<Vec3> likely = unlike(places, trials.mesh(), surface, true);
-    const std::vector<Vec3> unmatched = unmatched_components(trials.mesh(), *wanted, resolution);
-    for (auto* some : {&likely, &places}) some->insert(some->end(), unmatched.begin(), unmatched.end());
     std::unique_ptr<Patcher> patcher;
+    bool is_for_search = false;  // of the places that come next
+    const auto look_at = [&](const std::vector<Vec3>& some, bool to_search) {
+        patcher.reset();  // before there is another
+        patcher =
+            std::make_unique<Patcher>(trials, some, to_search ? kTriedReach : kLookReach, surface, effort);
+        is_for_search = to_search;
+    };
     std::size_t count = 0;
     std::set<std::array<double, 3>> around;  // vertices where a patch would be right, but did not fit
     const auto patch_at = [&](const Vec3& place, double reach, long most) {
@@ -319,7 +326,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const auto search = [&](std::vector<Vec3> some) {
         if (some.empty() || now == 0 || effort.is_enough(share)) return;
         if (some.size() > kMostPlaces) some.resize(kMostPlaces);
-        patcher = std::make_unique<Patcher>(trials, some, surface, effort);
+        if (!is_for_search) look_at(some, true);
         around.clear();
         patch_near(some, -1);
         std::vector<Vec3> more;
@@ -329,10 +336,29 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         patch_near(some, 0);
         patch_near(some, -1);
     };
-    search(likely);
+    const std::vector<Vec3> suspicious = places,
+                            unmatched = unmatched_components(trials.mesh(), *wanted, resolution);
+    places.insert(places.end(), unmatched.begin(), unmatched.end());
+    if (!places.empty()) {
+        look_at(places, places.size() <= kMostPlaces);
+        std::vector<Vec3> likely = patcher->unlike(suspicious, true);
+        likely.insert(likely.end(), unmatched.begin(), unmatched.end());
+        search(std::move(likely));
+    }
     share = 1.0;
-    if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true))
-        search(places_anywhere(trials.mesh(), surface, now));
+    if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true)) {
+        std::vector<Vec3> others;
+        if (now <= kMostAstray) others = places_everywhere(trials.mesh(), resolution);
+        is_for_search = false;
+        if (others.empty()) {
+            others = other_places(trials.mesh(), surface);
+        } else {
+            look_at(others, true);
+            others = patcher->unlike(others, false);
+        }
+        search(std::move(others));
+        is_for_search = false;
+    }
     search(places);
     return count;
 }
@@ -369,7 +395,7 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
         return other.components == topology.components && other.euler == topology.euler;
     };
     Effort effort;
-    Patcher patcher(trials, places, surface, effort);
+    Patcher patcher(trials, places, kTriedReach, surface, effort);
     std::size_t count = 0;
     const auto patch_at = [&](const Vec3& place, double reach, const auto& are_wanted) {
         return patcher
