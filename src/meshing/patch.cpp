@@ -28,13 +28,6 @@ constexpr std::size_t kMostSteps = 1 << 20;  // of a strip: the product of the l
 
 using Loop = std::vector<int>;
 
-double squared_distance_to_edge(const Vec3& p, const Vec3& a, const Vec3& b) {
-    const Vec3 ab = b - a, ap = p - a;
-    const double length2 = ab.squaredNorm();
-    const double t = length2 > 0.0 ? std::clamp(ap.dot(ab) / length2, 0.0, 1.0) : 0.0;
-    return (ap - t * ab).squaredNorm();
-}
-
 /// The edges of triangles, ascending by their ends, the lower first.
 class SortedEdges {
 public:
@@ -207,32 +200,47 @@ Part part_within(const Box& bounds, const TriangleBins& mesh) {
     return result;
 }
 
-/// The vertices of a source within its seam along some edges, ascending.
-std::vector<int> vertices_along(const std::vector<std::pair<int, int>>& border,
-                                const std::vector<Vec3>& points, const TriangleBins& source, double seam) {
-    std::vector<int> result;
-    for (const auto& [from, to] : border) {
-        const Vec3 &a = points[from], &b = points[to], margin = Vec3::Constant(seam);
-        for (const int t : source.meeting(Box(a.cwiseMin(b) - margin, a.cwiseMax(b) + margin)))
-            for (const int v : source.triangles()[t])
-                if (squared_distance_to_edge(source.points()[v], a, b) < seam * seam) result.push_back(v);
+/// Whether places are near the edges of a border.
+class Seam {
+public:
+    Seam(const std::vector<std::pair<int, int>>& border, const std::vector<Vec3>& points, double width)
+        : width2_(width * width) {
+        for (const auto& [from, to] : border) {
+            const Vec3 along = points[to] - points[from];
+            const double length2 = along.squaredNorm(), reach = 0.5 * std::sqrt(length2) + width;
+            edges_.push_back({points[from], along, length2 > 0.0 ? 1.0 / length2 : 0.0,
+                              points[from] + 0.5 * along, reach * reach});
+        }
     }
-    std::sort(result.begin(), result.end());
-    result.erase(std::unique(result.begin(), result.end()), result.end());
-    return result;
-}
+    bool is_near(const Vec3& p) const {
+        return std::any_of(edges_.begin(), edges_.end(), [&](const Edge& e) {
+            if ((p - e.middle).squaredNorm() > e.reach2) return false;
+            const Vec3 to_p = p - e.from;
+            const double t = std::clamp(to_p.dot(e.along) * e.inverse_length2, 0.0, 1.0);
+            return (to_p - t * e.along).squaredNorm() < width2_;
+        });
+    }
+
+private:
+    struct Edge {
+        Vec3 from, along;
+        double inverse_length2;
+        Vec3 middle;
+        double reach2;  // of what is near the edge, from its middle
+    };
+    std::vector<Edge> edges_;
+    double width2_;
+};
 
 /// Flags for the vertices of a part: it is nearer to what goes than to what stays, and not in the seam.
 std::vector<char> coming_vertices(const Part& part, const TriangleBins& mesh, const std::vector<char>& gone,
                                   const std::vector<std::pair<int, int>>& border, PatchSource& source) {
     source.look_beside(part.vertices, mesh);
-    const std::vector<int> in_seam =
-        vertices_along(border, mesh.points(), source.bins(), kSeam * source.spacing());
+    const Seam seam(border, mesh.points(), kSeam * source.spacing());
     std::vector<char> result;
     for (const int v : part.vertices) {
         const int beside = source.beside(v);
-        result.push_back(beside >= 0 && gone[beside] &&
-                         !std::binary_search(in_seam.begin(), in_seam.end(), v));
+        result.push_back(beside >= 0 && gone[beside] && !seam.is_near(source.bins().points()[v]));
     }
     return result;
 }
@@ -331,10 +339,10 @@ void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBi
             p,
             [&](int other) {
                 const double to_box = mesh.box_of(other).squaredExteriorDistance(p);
-                if (to_box >= std::max(nearest[0], nearest[1])) return;
+                if (to_box >= nearest[1]) return;
                 const Triangle& t = mesh.triangles()[other];
                 const bool same = area(t, points).dot(normal_[v]) > 0.0;
-                if (to_box >= nearest[same]) return;
+                if (!same && (at[1] >= 0 || to_box >= nearest[0])) return;
                 const double d = squared_distance(p, points[t[0]], points[t[1]], points[t[2]]);
                 if (d < nearest[same]) nearest[same] = d, at[same] = other;
             },
