@@ -14,11 +14,13 @@ namespace {
 
 // Of a crossing whose surroundings are looked at: of the tolerance; or so many spacings of the crossings less
 // than it, as the surface between them may be farther off. The larger counts. Where the spacing grows with
-// the tolerance, from a voxel on, that is 0.9 and, at folds, 0.5 to 0.8 of it; where it does not, nothing is
-// in doubt at last. On the inner side of a fold the middle between two crossings, each near a triangle of its
-// own, is at most half the way between them times the sine of half the angle between the normals farther off.
+// the tolerance, from a voxel on, that is 0.9 and, at folds, 0.55 of it; where it does not, nothing is in
+// doubt at last.
 constexpr double kNearlyTooFar = 0.8, kNearlyAtFolds = 0.1;
-constexpr double kFarther = 0.1, kFartherAtFolds = 0.5;  // the latter times that sine
+constexpr double kFarther = 0.1, kFartherAtFolds = 0.45;
+// On the inner side of a fold the middle between two crossings, each near a triangle of its own, is at most
+// half the way between them times the sine of half the angle between the normals farther off.
+constexpr double kFartherBetween = 0.5;  // times that sine; where none stands for others
 // Spacings: so far around lie those that a crossing stands for.
 constexpr double kStandsForWithin = 0.5, kStandsForOnFlat = 2.0;
 constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
@@ -59,13 +61,14 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
     std::vector<std::atomic<char>> at_fold(crossings_.size());  // and nearly too far off for it
     const std::vector<float> turns = turns_at_vertices(vertices, triangles);
     const double spacing = crossings_.spacing();
+    const bool thinned_out = crossings_.thinned_out(surface_);
     const Vec3 reach = Vec3::Constant(tolerance_);
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         const auto& [i, j, k] = triangles[t];
         const double turn = std::max({turns[i], turns[j], turns[k]});
         if (turn == 0.0) return;
-        const double nearly =
-            std::max(kNearlyAtFolds * tolerance_, tolerance_ - kFartherAtFolds * turn * spacing);
+        const double farther = thinned_out ? kFartherAtFolds : kFartherBetween * turn,
+                     nearly = std::max(kNearlyAtFolds * tolerance_, tolerance_ - farther * spacing);
         Box box;
         for (const int v : triangles[t]) box.extend(vertices[v]);
         crossings_.for_each_in(Box(box.min() - reach, box.max() + reach), [&](std::size_t c) {
@@ -85,7 +88,7 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
                 found.push_back(static_cast<int>(c));
             }
         });
-    if (!crossings_.thinned_out(surface_)) return cells_.around(doubtful);
+    if (!thinned_out) return cells_.around(doubtful);
     std::vector<Surface::Crossing> result;
     for (const bool flat : {false, true}) {
         std::vector<Vec3> places;
