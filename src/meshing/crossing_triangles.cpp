@@ -21,17 +21,16 @@ std::vector<char> crossing_triangles(const std::vector<Vec3>& points, const std:
     // As large as they are; those that are all points have no size.
     const double size = std::max(1e-6 * around.diagonal().norm(), std::numeric_limits<double>::min());
     const TriangleBins bins(points, some, size);
-    TriangleMesh near;
-    near.points = points;
+    std::vector<Triangle> near;
     std::vector<std::size_t> of;  // triangle of each that is near
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         const Box box = box_of(points, triangles[t]);
         if (!around.intersects(box) || !bins.any_meets(box)) continue;
-        near.triangles.push_back(triangles[t]);
+        near.push_back(triangles[t]);
         of.push_back(t);
     }
     std::vector<char> crossing(triangles.size(), 0);
-    for (const auto& pair : self_intersections(near))
+    for (const auto& pair : self_intersections(points, near))
         for (const int t : {pair.first, pair.second}) crossing[of[t]] = 1;
     return crossing;
 }

@@ -6,6 +6,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <string>
 
 #include "isotrack/error.h"
@@ -81,18 +83,27 @@ bool cross(const std::vector<Vec3>& points, const Triangle& first, const Triangl
 }
 
 /// A triangle's bounding box, in the form CGAL's box intersection asks for. Its axes are those of space in
-/// another order.
+/// another order. In floats, rounded outwards: there are many.
 struct TriangleBox {
-    using NT = double;
+    using NT = float;
     using ID = int;
     static int dimension() { return 3; }
-    double min_coord(int axis) const { return low[axis]; }
-    double max_coord(int axis) const { return high[axis]; }
+    float min_coord(int axis) const { return low[axis]; }
+    float max_coord(int axis) const { return high[axis]; }
     int id() const { return triangle; }
 
-    double low[3], high[3];
+    float low[3], high[3];
     int triangle;
 };
+
+float rounded_down(double x) {
+    const auto nearest = static_cast<float>(x);
+    return nearest > x ? std::nextafter(nearest, -std::numeric_limits<float>::infinity()) : nearest;
+}
+
+float rounded_up(double x) {
+    return -rounded_down(-x);
+}
 
 // Space is cut into slabs across its longest axis, so that threads can search them one by one. CGAL splits
 // boxes along its axis 2, then 1, and scans along axis 0: with the thin side of the slabs on axis 1 a search
@@ -102,36 +113,33 @@ constexpr std::size_t kSlabSize = 4096;     // boxes that begin in a slab, on av
 constexpr std::ptrdiff_t kScanBelow = 100;  // boxes; splitting further costs more than comparing all
 
 /// Boxes of the triangles with area, in the mesh's order.
-std::vector<TriangleBox> boxes_of(const TriangleMesh& mesh) {
+std::vector<TriangleBox> boxes_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
     Box bounds;
-    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
-        if (!mesh.points[i].allFinite()) throw InputError("vertex " + std::to_string(i) + " is not finite");
-        bounds.extend(mesh.points[i]);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (!points[i].allFinite()) throw InputError("vertex " + std::to_string(i) + " is not finite");
+        bounds.extend(points[i]);
     }
     int longest = 0;
     if (!bounds.isEmpty()) bounds.sizes().maxCoeff(&longest);
 
-    std::vector<TriangleBox> boxes(mesh.triangles.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, boxes.size(), 1024),
-                      [&](const tbb::blocked_range<std::size_t>& range) {
-                          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                              const Triangle& t = mesh.triangles[i];
-                              for (int v : t)
-                                  if (v < 0 || static_cast<std::size_t>(v) >= mesh.points.size())
-                                      throw InputError("triangle " + std::to_string(i) + " names vertex " +
-                                                       std::to_string(v) + " of a mesh with " +
-                                                       std::to_string(mesh.points.size()) + " vertices");
-                              const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]],
-                                         &c = mesh.points[t[2]];
-                              const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-                              TriangleBox& box = boxes[i];
-                              for (int k = 0; k < 3; ++k) {
-                                  const int axis = (longest + 3 + k - kSlabAxis) % 3;
-                                  box.low[k] = low[axis], box.high[k] = high[axis];
-                              }
-                              box.triangle = has_area(a, b, c) ? static_cast<int>(i) : -1;
-                          }
-                      });
+    std::vector<TriangleBox> boxes(triangles.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, boxes.size(), 1024), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            const Triangle& t = triangles[i];
+            for (int v : t)
+                if (v < 0 || static_cast<std::size_t>(v) >= points.size())
+                    throw InputError("triangle " + std::to_string(i) + " names vertex " + std::to_string(v) +
+                                     " of a mesh with " + std::to_string(points.size()) + " vertices");
+            const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+            const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
+            TriangleBox& box = boxes[i];
+            for (int k = 0; k < 3; ++k) {
+                const int axis = (longest + 3 + k - kSlabAxis) % 3;
+                box.low[k] = rounded_down(low[axis]), box.high[k] = rounded_up(high[axis]);
+            }
+            box.triangle = has_area(a, b, c) ? static_cast<int>(i) : -1;
+        }
+    });
     boxes.erase(
         std::remove_if(boxes.begin(), boxes.end(), [](const TriangleBox& b) { return b.triangle < 0; }),
         boxes.end());
@@ -145,17 +153,23 @@ struct Slab {
 
 std::vector<Slab> cut_into_slabs(const std::vector<TriangleBox>& boxes) {
     constexpr std::size_t kSamplesPerSlab = 64;
-    std::vector<double> sample;
+    std::vector<float> sample;
     for (std::size_t i = 0; i < boxes.size(); i += kSlabSize / kSamplesPerSlab)
         sample.push_back(boxes[i].low[kSlabAxis]);
     std::sort(sample.begin(), sample.end());
-    std::vector<double> begins;  // of all slabs but the first
+    std::vector<float> begins;  // of all slabs but the first
     for (std::size_t i = kSamplesPerSlab; i < sample.size(); i += kSamplesPerSlab)
         begins.push_back(sample[i]);
 
-    std::vector<Slab> slabs(begins.size() + 1);
+    const auto slab_of = [&](const TriangleBox& box) -> std::size_t {
+        return std::upper_bound(begins.begin(), begins.end(), box.low[kSlabAxis]) - begins.begin();
+    };
+    std::vector<std::size_t> count(begins.size() + 1);
+    for (const TriangleBox& box : boxes) ++count[slab_of(box)];
+    std::vector<Slab> slabs(count.size());
+    for (std::size_t k = 0; k < slabs.size(); ++k) slabs[k].own.reserve(count[k]);
     for (const TriangleBox& box : boxes) {
-        std::size_t k = std::upper_bound(begins.begin(), begins.end(), box.low[kSlabAxis]) - begins.begin();
+        std::size_t k = slab_of(box);
         slabs[k].own.push_back(box);
         for (; k < begins.size() && begins[k] <= box.high[kSlabAxis]; ++k)
             slabs[k + 1].earlier.push_back(box);
@@ -165,14 +179,15 @@ std::vector<Slab> cut_into_slabs(const std::vector<TriangleBox>& boxes) {
 
 }  // namespace
 
-std::vector<std::pair<int, int>> self_intersections(const TriangleMesh& mesh) {
+std::vector<std::pair<int, int>> self_intersections(const std::vector<Vec3>& points,
+                                                    const std::vector<Triangle>& triangles) {
     // Two boxes that overlap do so in the slab where the second of them begins.
-    std::vector<Slab> slabs = cut_into_slabs(boxes_of(mesh));
+    std::vector<Slab> slabs = cut_into_slabs(boxes_of(points, triangles));
     std::vector<Pairs> found(slabs.size());
     tbb::parallel_for(std::size_t(0), slabs.size(), [&](std::size_t k) {
         Slab& slab = slabs[k];
         const auto test = [&](const TriangleBox& a, const TriangleBox& b) {
-            if (cross(mesh.points, mesh.triangles[a.triangle], mesh.triangles[b.triangle]))
+            if (cross(points, triangles[a.triangle], triangles[b.triangle]))
                 found[k].push_back(std::minmax(a.triangle, b.triangle));
         };
         CGAL::box_self_intersection_d(slab.own.begin(), slab.own.end(), test, kScanBelow);

@@ -72,7 +72,7 @@ bool Fitted::undo_crossing(FrameMesh& mesh, std::size_t particles) {
     std::vector<char> undo(mesh.vertices.size(), 0);
     bool any = false;
     for (bool changed = true; changed;) {
-        const auto crossing = self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}});
+        const auto crossing = self_intersections(mesh.vertices, mesh.carved.triangles);
         if (crossing.empty()) break;
         any = true;
         changed = false;

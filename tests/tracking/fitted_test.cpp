@@ -175,9 +175,9 @@ TEST(Fitted, TakesBackWhatCrosses) {
     const std::size_t particles = carved.particles.size();
     Fitted fitted;
     fitted.fit_vertices(mesh, particles, *lower, 10.0);
-    ASSERT_FALSE(self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}).empty());
+    ASSERT_FALSE(self_intersections(mesh.vertices, mesh.carved.triangles).empty());
     EXPECT_TRUE(fitted.undo_crossing(mesh, particles));
-    EXPECT_TRUE(self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}).empty());
+    EXPECT_TRUE(self_intersections(mesh.vertices, mesh.carved.triangles).empty());
     EXPECT_FALSE(fitted.undo_crossing(mesh, particles));
 }
 

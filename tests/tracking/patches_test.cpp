@@ -35,7 +35,7 @@ openvdb::FloatGrid::Ptr thin_disk_and_ball() {
 void expect_sound(const FrameMesh& mesh) {
     const MeshTopology topology = topology_of(mesh);
     EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
-    EXPECT_TRUE(self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}).empty());
+    EXPECT_TRUE(self_intersections(mesh.vertices, mesh.carved.triangles).empty());
 }
 
 /// Takes cells near a place out of a surface's mesh, which gets that other Euler number, then patches it.

@@ -103,7 +103,7 @@ TEST(LostDrops, ArePutInWhereTheMeshHasNothingOfThem) {
     EXPECT_EQ(then.components, before.components + 2);
     EXPECT_EQ(then.euler, before.euler + 4);
     EXPECT_TRUE(then.closed() && then.oriented() && then.manifold());
-    EXPECT_TRUE(self_intersections({mesh.vertices, mesh.carved.triangles, {}, {}}).empty());
+    EXPECT_TRUE(self_intersections(mesh.vertices, mesh.carved.triangles).empty());
     EXPECT_EQ(now.inspection.errors->size(), mesh.carved.triangles.size());
     EXPECT_EQ(mesh.on_surface.size(), mesh.vertices.size());
     EXPECT_EQ(mesh.carved.particle.size(), mesh.vertices.size());

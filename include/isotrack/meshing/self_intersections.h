@@ -14,7 +14,11 @@ namespace isotrack {
 /// pairs. Triangles without area take no part: in a closed mesh the neighbours on their edges touch what they
 /// touch. About 1 us per triangle and core; uses TBB inside. \throws InputError for a vertex that is not
 /// finite, or a triangle with an index outside `points`.
-std::vector<std::pair<int, int>> self_intersections(const TriangleMesh& mesh);
+std::vector<std::pair<int, int>> self_intersections(const std::vector<Vec3>& points,
+                                                    const std::vector<Triangle>& triangles);
+inline std::vector<std::pair<int, int>> self_intersections(const TriangleMesh& mesh) {
+    return self_intersections(mesh.points, mesh.triangles);
+}
 
 /// Whether a triangle of `some` makes a pair with another of them or with one of `others`. For a few in
 /// `some`: compares all with all of those and of what is near them.
