@@ -107,9 +107,10 @@ void undo_spoilt(const std::vector<Vec3>& vertices, const std::vector<Triangle>&
 }  // namespace
 
 void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, const Corners& corners,
-               const std::vector<FacetValues>& facets, const Surface& surface, int steps,
+               std::vector<FacetValues> facets, const Surface& surface, int steps,
                const std::vector<char>& movable, double damping) {
     std::vector<Share> shares(facets.begin(), facets.end());
+    facets = std::vector<FacetValues>();  // there are many
     std::vector<int> moving;
     for (std::size_t v = 0; v < vertices.size(); ++v)
         if (movable[v]) moving.push_back(static_cast<int>(v));

@@ -13,7 +13,7 @@ namespace isotrack {
 /// move. Those at creases change otherwise: they are read again at each step. `corners`: of the triangles,
 /// which must be all around a movable vertex.
 void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, const Corners& corners,
-               const std::vector<FacetValues>& facets, const Surface& surface, int steps,
+               std::vector<FacetValues> facets, const Surface& surface, int steps,
                const std::vector<char>& movable, double damping);
 
 }  // namespace isotrack

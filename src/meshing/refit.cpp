@@ -4,6 +4,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "find_in_blocks.h"
 #include "isotrack/meshing/certify.h"
@@ -85,8 +86,8 @@ public:
         }
         return done;
     }
-    /// Of the triangles after the last pass.
-    const std::vector<FacetValues>& facets() const { return facets_; }
+    /// Of the triangles after the last pass, which are given up.
+    std::vector<FacetValues> take_facets() { return std::move(facets_); }
 
 private:
     FacetValues facet_of(const Triangle& t, Surface::Probe& probe) const {
@@ -196,7 +197,7 @@ std::vector<std::array<int, 2>> refit(std::vector<Vec3>& vertices, std::vector<T
     for (int round = 0; round < kRounds; ++round) {
         const auto some = flips.pass(movable);
         done.insert(done.end(), some.begin(), some.end());
-        fit_steps(vertices, triangles, Corners(vertices.size(), triangles), flips.facets(), surface,
+        fit_steps(vertices, triangles, Corners(vertices.size(), triangles), flips.take_facets(), surface,
                   kFitSteps, movable, kDamping);
     }
     return done;

@@ -13,7 +13,7 @@ Facet MeshFacets::operator[](std::size_t triangle) const {
 }
 
 void MeshFacets::write_to(std::vector<Facet>& facets) const {
-    facets = {};  // first, as there are many
+    facets = std::vector<Facet>();  // first, as there are many
     facets.resize(size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 1024), [&](const auto& range) {
         for (std::size_t t = range.begin(); t < range.end(); ++t) facets[t] = (*this)[t];

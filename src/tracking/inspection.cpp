@@ -191,8 +191,8 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     for (std::size_t f = 0; f < facets.size(); ++f)
         if (too_far[f] && (seen[f] || !probe->project((*measured)[f].where)))
             in_vain.push_back((*measured)[f].where);
+    errors_ = result.errors = measured;  // first: the errors before have no use any more
     facets.write_to(facets_);
-    errors_ = result.errors = measured;
     expected_.reset();  // vertices may move from now on
     return in_vain;
 }

@@ -367,6 +367,10 @@ private:
     bool guided() const { return !in_paper() && options().reconstruction == Reconstruction::Guided; }
 
     void make_mesh();
+    void inspect_both_ways() {
+        work_.inspection = {};  // first: there are many errors
+        work_.inspection = work_.inspector->inspect_both_ways(work_.mesh);
+    }
     /// Where nothing is thin the nodes of the lattice need not be looked at: the Euler number tells.
     bool is_thick() const;
     bool has_topology() const {
@@ -494,10 +498,10 @@ void Tracker::Impl::Making::certify() {
         const StageTimer timer(work_.frame.seconds, "certify");
         const bool last = in_paper() || round == kCertifyRounds;
         const auto passes_or_last = [&] { return last || passes(); };
-        inspection = inspector.inspect_both_ways(mesh);
+        inspect_both_ways();
         if (!passes_or_last()) continue;
         if (options().fit && fitted_.undo_crossing(mesh, particles().size())) {
-            inspection = inspector.inspect_both_ways(mesh);
+            inspect_both_ways();
             if (!passes_or_last()) continue;
         }
         inspector.look_between(mesh, inspection);
