@@ -293,12 +293,12 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const auto wanted = surface.lattice_components();
     if (!wanted) return 0;
     std::unique_ptr<Patcher> patcher;
-    bool is_for_search = false;  // of the places that come next
+    bool is_for_next = false;  // search: near enough to all its places
     const auto look_at = [&](const std::vector<Vec3>& some, bool to_search) {
         patcher.reset();  // before there is another
         patcher =
             std::make_unique<Patcher>(trials, some, to_search ? kTriedReach : kLookReach, surface, effort);
-        is_for_search = to_search;
+        is_for_next = to_search;
     };
     std::size_t count = 0;
     std::set<std::array<double, 3>> around;  // vertices where a patch would be right, but did not fit
@@ -326,7 +326,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const auto search = [&](std::vector<Vec3> some) {
         if (some.empty() || now == 0 || effort.is_enough(share)) return;
         if (some.size() > kMostPlaces) some.resize(kMostPlaces);
-        if (!is_for_search) look_at(some, true);
+        if (!is_for_next) look_at(some, true);
         around.clear();
         patch_near(some, -1);
         std::vector<Vec3> more;
@@ -344,12 +344,13 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         std::vector<Vec3> likely = patcher->unlike(suspicious, true);
         likely.insert(likely.end(), unmatched.begin(), unmatched.end());
         search(std::move(likely));
+        is_for_next = places.size() <= kMostPlaces;
     }
     share = 1.0;
     if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true)) {
         std::vector<Vec3> others;
         if (now <= kMostAstray) others = places_everywhere(trials.mesh(), resolution);
-        is_for_search = false;
+        is_for_next = false;
         if (others.empty()) {
             others = other_places(trials.mesh(), surface);
         } else {
@@ -357,7 +358,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
             others = patcher->unlike(others, false);
         }
         search(std::move(others));
-        is_for_search = false;
+        is_for_next = false;
     }
     search(places);
     return count;
