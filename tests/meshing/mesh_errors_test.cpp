@@ -123,6 +123,32 @@ TEST(CrossingDistances, AreExactUpToTheCutoffAndInfiniteBeyond) {
     }
 }
 
+TEST(FacingTriangle, IsAsFarAsItsNearestPointUpToALimit) {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    const auto place = [&] { return Vec3(unit(random), unit(random), unit(random)); };
+    int within = 0, beyond = 0;
+    for (int trial = 0; trial < 30000; ++trial) {
+        const Vec3 a = place();
+        Vec3 b = place(), c = place();
+        if (trial % 3 == 1) c = a + unit(random) * (b - a) + 1e-4 * place();  // nearly without area
+        if (trial % 3 == 2) b = a + 1e-4 * place();
+        const Surface::Crossing crossing{place(), (b - a).cross(c - a).normalized().cast<float>()};
+        const double truth = support::distance_to_triangle(crossing.point, a, b, c),
+                     limit = std::abs(unit(random)),
+                     found = std::sqrt(FacingTriangle(a, b, c).squared_distance(crossing, limit * limit));
+        if (truth < limit || std::isfinite(found)) {
+            EXPECT_NEAR(found, truth, 1e-9) << trial;
+        }
+        ++(truth < limit ? within : beyond);
+    }
+    EXPECT_GT(within, 5000);
+    EXPECT_GT(beyond, 5000);
+    const FacingTriangle without_area({0, 0, 0}, {1, 0, 0}, {0, 0, 0});
+    EXPECT_NEAR(without_area.squared_distance({{0.5, 2.0, 0.0}, {0.0f, 1.0f, 0.0f}}, 5.0), 4.0, 1e-12);
+    EXPECT_NEAR(without_area.squared_distance({{3.0, 0.0, 0.0}, {0.0f, 1.0f, 0.0f}}, 5.0), 4.0, 1e-12);
+}
+
 TEST(CrossingDistances, AreInfiniteWithoutAMesh) {
     const CrossingGrid grid(*shapes::sphere({0, 0, 0}, 1.0, 0.2));
     for (const double d : crossing_distances({}, {}, grid, 1.0)) EXPECT_TRUE(std::isinf(d));
