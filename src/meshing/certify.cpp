@@ -278,20 +278,24 @@ private:
 
 FacingTriangle::FacingTriangle(const Vec3& a, const Vec3& b, const Vec3& c)
     : corner_{a, b, c}, normal_((b - a).cross(c - a).normalized()) {
+    constexpr double kFlat = 1e-12;  // twice the area, of the longest edge squared: its normal is rounding
+    const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+    const bool flat = !((b - a).cross(c - a).norm() > kFlat * longest2);
     for (int k = 0; k < 3; ++k) {
-        out_[k] = (corner_[(k + 1) % 3] - corner_[k]).cross(normal_);
+        out_[k] = flat ? Vec3(Vec3::Zero()) : (corner_[(k + 1) % 3] - corner_[k]).cross(normal_);
         length2_[k] = out_[k].squaredNorm();
     }
 }
 
 double FacingTriangle::squared_distance(const Surface::Crossing& crossing, double limit) const {
     constexpr double kInfinite = std::numeric_limits<double>::infinity();
+    constexpr double kRounding = 1e-9;  // ample: what is as far as the limit is measured
     const double off_plane = normal_.dot(crossing.point - corner_[0]), off_plane2 = off_plane * off_plane;
     if (off_plane2 > limit || normal_.dot(crossing.outward.cast<double>()) < kStandsFor) return kInfinite;
     bool over = true;  // the triangle, and not one without area
     for (int k = 0; k < 3; ++k) {
         const double out = out_[k].dot(crossing.point - corner_[k]);  // times the length of the edge
-        if (out > 0.0 && out * out > (limit - off_plane2) * length2_[k]) return kInfinite;
+        if (out > 0.0 && out * out > ((1.0 + kRounding) * limit - off_plane2) * length2_[k]) return kInfinite;
         over = over && out < 0.0;
     }
     if (over) return off_plane2;

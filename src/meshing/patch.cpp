@@ -339,6 +339,7 @@ void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBi
             p,
             [&](int other) {
                 const double to_box = mesh.box_of(other).squaredExteriorDistance(p);
+                // Another way counts only while none is known that faces the same way.
                 if (to_box >= nearest[1]) return;
                 const Triangle& t = mesh.triangles()[other];
                 const bool same = area(t, points).dot(normal_[v]) > 0.0;

@@ -83,7 +83,7 @@ bool cross(const std::vector<Vec3>& points, const Triangle& first, const Triangl
 }
 
 /// A triangle's bounding box, in the form CGAL's box intersection asks for. Its axes are those of space in
-/// another order. In floats, rounded outwards: there are many.
+/// another order. In floats from the least corner of all on, rounded outwards: there are many.
 struct TriangleBox {
     using NT = float;
     using ID = int;
@@ -135,7 +135,8 @@ std::vector<TriangleBox> boxes_of(const std::vector<Vec3>& points, const std::ve
             TriangleBox& box = boxes[i];
             for (int k = 0; k < 3; ++k) {
                 const int axis = (longest + 3 + k - kSlabAxis) % 3;
-                box.low[k] = rounded_down(low[axis]), box.high[k] = rounded_up(high[axis]);
+                const double from = bounds.min()[axis];
+                box.low[k] = rounded_down(low[axis] - from), box.high[k] = rounded_up(high[axis] - from);
             }
             box.triangle = has_area(a, b, c) ? static_cast<int>(i) : -1;
         }

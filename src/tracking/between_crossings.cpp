@@ -13,14 +13,13 @@ namespace isotrack {
 namespace {
 
 // Of a crossing whose surroundings are looked at: of the tolerance; or so many spacings of the crossings less
-// than it, as the surface between them may be farther off. The larger counts. Where the spacing grows with
-// the tolerance, from a voxel on, that is 0.9 and, at folds, 0.55 of it; where it does not, nothing is in
-// doubt at last.
+// than it, as the surface between them may be farther off. The larger counts.
 constexpr double kNearlyTooFar = 0.8, kNearlyAtFolds = 0.1;
-constexpr double kFarther = 0.1, kFartherAtFolds = 0.45;
-// On the inner side of a fold the middle between two crossings, each near a triangle of its own, is at most
-// half the way between them times the sine of half the angle between the normals farther off.
-constexpr double kFartherBetween = 0.5;  // times that sine; where none stands for others
+constexpr double kFarther = 0.1, kFartherAtFolds = 0.45;  // the latter where some stand for others
+// Where none stands for others: times the sine of half the angle between the normals at a fold, as on its
+// inner side the middle between two crossings, each near a triangle of its own, is up to half the way between
+// them times that farther off. Some ways are longer than a spacing; that misses no more was measured.
+constexpr double kFartherBetween = 0.5;
 // Spacings: so far around lie those that a crossing stands for.
 constexpr double kStandsForWithin = 0.5, kStandsForOnFlat = 2.0;
 constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
@@ -39,12 +38,13 @@ std::vector<float> turns_at_vertices(const std::vector<Vec3>& vertices,
     std::vector<Eigen::Vector3f> sum(vertices.size(), Eigen::Vector3f::Zero());
     for (std::size_t t = 0; t < triangles.size(); ++t)
         for (const int v : triangles[t]) sum[v] += area[t];
-    std::vector<std::array<float, 3>> turn(triangles.size());  // at each corner
+    std::vector<std::array<float, 3>> turn(triangles.size(), {0.0f, 0.0f, 0.0f});  // at each corner
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         for (int k = 0; k < 3; ++k) {
             const Eigen::Vector3f& normal = sum[triangles[t][k]];
-            const float cosine = area[t].dot(normal) / (area[t].norm() * normal.norm());
-            turn[t][k] = cosine >= kFold ? 0.0f : cosine > 0.0f ? std::sqrt(1.0f - cosine * cosine) : 1.0f;
+            const float dot = area[t].dot(normal), norms = area[t].norm() * normal.norm();
+            if (dot >= kFold * norms) continue;
+            turn[t][k] = dot > 0.0f ? std::sqrt(1.0f - dot / norms * (dot / norms)) : 1.0f;
         }
     });
     std::vector<float> result(vertices.size(), 0.0f);

@@ -19,11 +19,11 @@ public:
           tolerance_(tolerance),
           cells_(crossings, surface.lattice(), diagonals) {}
 
-    /// Points of the surface beside crossings that the mesh only just reaches: at its folds those with less
-    /// than half a spacing of the crossings to spare, since from a fold what lies between two crossings may
-    /// be much farther than either, but fewer where the surface is flat. Where some crossings stand for
-    /// others: those others. Else points in cells, of those with an ambiguous face in all. What was returned
-    /// before is left out.
+    /// Points of the surface beside crossings that the mesh only just reaches: at its folds, the sharper the
+    /// sooner, those with up to half a spacing of the crossings to spare, since from a fold what lies between
+    /// two crossings may be much farther than either, but fewer where the surface is flat. Where some
+    /// crossings stand for others: those others. Else points in cells, of those with an ambiguous face in
+    /// all. What was returned before is left out.
     std::vector<Surface::Crossing> points(const std::vector<Vec3>& vertices,
                                           const std::vector<Triangle>& triangles,
                                           const MeshDistances& at_crossings);

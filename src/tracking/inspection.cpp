@@ -192,8 +192,8 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
         if (too_far[f] && (seen[f] || !probe->project((*measured)[f].where)))
             in_vain.push_back((*measured)[f].where);
     errors_ = result.errors = measured;  // first: the errors before have no use any more
+    expected_.reset();                   // vertices may move from now on
     facets.write_to(facets_);
-    expected_.reset();  // vertices may move from now on
     return in_vain;
 }
 

@@ -29,8 +29,8 @@ constexpr double kApart = 1.5;    // places that near are one
 constexpr double kCovered = 2.0;  // so far apart they leave nothing out
 constexpr double kAround = 2.5;   // the middles of other patches for what fails
 constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
-constexpr double kTriedReach = 24.0,
-                 kLookReach = 14.0;  // of the lattice, around places that are tried, looked at
+// How far around places the lattice is made, for patches there with the largest reach, or to look at them.
+constexpr double kTriedReach = 24.0, kLookReach = 4.0 * kSmall;
 constexpr double kMostArea = 50000.0,
                  kMostAreaOfPlace = 50.0;  // square: what goes, for all patches, for one
 constexpr double kFlat = 1e-3;             // twice the area over the square of the longest edge
@@ -293,12 +293,9 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const auto wanted = surface.lattice_components();
     if (!wanted) return 0;
     std::unique_ptr<Patcher> patcher;
-    bool is_for_next = false;  // search: near enough to all its places
-    const auto look_at = [&](const std::vector<Vec3>& some, bool to_search) {
+    const auto make_lattice = [&](const std::vector<Vec3>& some, double reach) {
         patcher.reset();  // before there is another
-        patcher =
-            std::make_unique<Patcher>(trials, some, to_search ? kTriedReach : kLookReach, surface, effort);
-        is_for_next = to_search;
+        patcher = std::make_unique<Patcher>(trials, some, reach, surface, effort);
     };
     std::size_t count = 0;
     std::set<std::array<double, 3>> around;  // vertices where a patch would be right, but did not fit
@@ -323,10 +320,10 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
                 if (now > 0 && !effort.is_enough(share)) patch_at(place, reach, now + worse);
         patcher->try_again();
     };
-    const auto search = [&](std::vector<Vec3> some) {
+    const auto search = [&](std::vector<Vec3> some, bool has_lattice) {
         if (some.empty() || now == 0 || effort.is_enough(share)) return;
         if (some.size() > kMostPlaces) some.resize(kMostPlaces);
-        if (!is_for_next) look_at(some, true);
+        if (!has_lattice) make_lattice(some, kTriedReach);
         around.clear();
         patch_near(some, -1);
         std::vector<Vec3> more;
@@ -339,28 +336,28 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const std::vector<Vec3> suspicious = places,
                             unmatched = unmatched_components(trials.mesh(), *wanted, resolution);
     places.insert(places.end(), unmatched.begin(), unmatched.end());
+    bool all_have_lattice = places.size() <= kMostPlaces;  // for patches
     if (!places.empty()) {
-        look_at(places, places.size() <= kMostPlaces);
+        make_lattice(places, all_have_lattice ? kTriedReach : kLookReach);
         std::vector<Vec3> likely = patcher->unlike(suspicious, true);
         likely.insert(likely.end(), unmatched.begin(), unmatched.end());
-        search(std::move(likely));
-        is_for_next = places.size() <= kMostPlaces;
+        search(std::move(likely), all_have_lattice);
     }
     share = 1.0;
     if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true)) {
         std::vector<Vec3> others;
         if (now <= kMostAstray) others = places_everywhere(trials.mesh(), resolution);
-        is_for_next = false;
-        if (others.empty()) {
-            others = other_places(trials.mesh(), surface);
-        } else {
-            look_at(others, true);
+        const bool everywhere = !others.empty();
+        if (everywhere) {
+            make_lattice(others, kTriedReach);
             others = patcher->unlike(others, false);
+        } else {
+            others = other_places(trials.mesh(), surface);
         }
-        search(std::move(others));
-        is_for_next = false;
+        search(std::move(others), everywhere);
+        all_have_lattice = false;
     }
-    search(places);
+    search(places, all_have_lattice);
     return count;
 }
 

@@ -80,7 +80,7 @@ public:
 
 private:
     Vec3 corner_[3], normal_;
-    Vec3 out_[3];        // in the plane, from the edge after each corner away from the triangle
+    Vec3 out_[3];        // in the plane, from the edge after each corner away from it; zero without area
     double length2_[3];  // of these, and so of the edges
 };
 

@@ -16,6 +16,7 @@ namespace isotrack {
 /// finite, or a triangle with an index outside `points`.
 std::vector<std::pair<int, int>> self_intersections(const std::vector<Vec3>& points,
                                                     const std::vector<Triangle>& triangles);
+/// The same for a mesh.
 inline std::vector<std::pair<int, int>> self_intersections(const TriangleMesh& mesh) {
     return self_intersections(mesh.points, mesh.triangles);
 }
