@@ -1,6 +1,5 @@
 #include "tracking/carry.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -8,49 +7,72 @@
 #include <limits>
 #include <utility>
 
+#include "parallel_for_each.h"
 #include "surface/thread_probes.h"
+#include "tracking/registration.h"
 
 namespace isotrack {
 namespace {
 
 constexpr std::size_t kVoters = 2000;
-constexpr double kClearly = 0.8;
+constexpr double kClearly = 0.8;   // times the distance of the best guess before
+constexpr double kArrived = 0.25;  // resolutions off the surface
 
-std::vector<Vec3> expected_positions(const Particles& particles, const Surface& surface,
-                                     const Tracker::Motion& motion) {
-    const std::size_t n = particles.size(), step = 1 + n / kVoters;
-    std::vector<std::vector<Vec3>> guesses;
-    if (motion) {
-        guesses.emplace_back(n);
-        tbb::parallel_for(std::size_t{0}, n,
-                          [&](std::size_t i) { guesses.back()[i] = motion(particles.position[i]); });
-    }
-    guesses.emplace_back(n);
-    for (std::size_t i = 0; i < n; ++i) guesses.back()[i] = particles.position[i] + particles.velocity[i];
-    guesses.push_back(particles.position);
+/// The median distance from the surface of so many places.
+double median_off(const std::vector<Vec3>& places, const Surface& surface) {
     const auto probe = surface.probe();
-    std::size_t winner = 0;
+    std::vector<double> distances;
+    for (std::size_t i = 0; i < places.size(); i += 1 + places.size() / kVoters)
+        distances.push_back(std::abs(probe->value(places[i])));
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    return *middle;
+}
+
+/// Of one particle at least.
+std::vector<Vec3> expected_positions(const Particles& particles, const Adjacency& ring,
+                                     const Surface& surface, const Tracker::Motion& motion) {
+    const std::size_t n = particles.size();
+    std::vector<Vec3> winner;
     double least = std::numeric_limits<double>::infinity();
-    for (std::size_t g = 0; g < guesses.size(); ++g) {
-        std::vector<double> distances;
-        for (std::size_t i = 0; i < n; i += step) distances.push_back(std::abs(probe->value(guesses[g][i])));
-        if (distances.empty()) break;
-        const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-        std::nth_element(distances.begin(), middle, distances.end());
-        if (*middle < kClearly * least) {
-            least = *middle;
-            winner = g;
-        }
+    const auto take = [&](std::vector<Vec3> guess, double better) {
+        const double off = median_off(guess, surface);
+        if (!winner.empty() && !(off < better * least)) return false;
+        least = off;
+        winner = std::move(guess);
+        return true;
+    };
+    if (motion) {
+        std::vector<Vec3> guess(n);
+        parallel_for_each(n, 256, [&](std::size_t i) { guess[i] = motion(particles.position[i]); });
+        take(std::move(guess), 1.0);
     }
-    return std::move(guesses[winner]);
+    std::vector<Vec3> guess(n);
+    for (std::size_t i = 0; i < n; ++i) guess[i] = particles.position[i] + particles.velocity[i];
+    const bool goes_on = take(std::move(guess), kClearly), stands = take(particles.position, kClearly);
+    auto registered = register_to(surface, particles, ring, winner);
+    if (!registered) return winner;
+    if (goes_on || stands) {
+        take(std::move(*registered), 1.0);
+        return winner;
+    }
+    // A field knows better where it knows anything: it may be given in a band alone.
+    ThreadProbes probes(surface);
+    parallel_for_each(n, 256, [&](std::size_t i) {
+        const double off = std::abs(probes.local().value(winner[i]));
+        if (!(off < kArrived * surface.resolution())) winner[i] = (*registered)[i];
+    });
+    return winner;
 }
 
 }  // namespace
 
-std::vector<char> carry(Particles& particles, const Surface& surface, const Tracker::Motion& motion) {
+std::vector<char> carry(Particles& particles, const Adjacency& ring, const Surface& surface,
+                        const Tracker::Motion& motion) {
     const std::size_t n = particles.size();
     std::vector<char> keep(n, 0);
-    const std::vector<Vec3> expected = expected_positions(particles, surface, motion);
+    if (n == 0) return keep;
+    const std::vector<Vec3> expected = expected_positions(particles, ring, surface, motion);
     ThreadProbes probes(surface);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 128), [&](const auto& range) {
         Surface::Probe& probe = probes.local();

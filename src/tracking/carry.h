@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "isotrack/sampling/adjacency.h"
 #include "isotrack/sampling/particles.h"
 #include "isotrack/surface/surface.h"
 #include "isotrack/tracking/tracker.h"
@@ -15,7 +16,9 @@ namespace isotrack {
 /// A velocity field may be in a unit nobody knows and a motion may have turned round, so three guesses of
 /// where the particles go compete: `motion` if there is one, the last displacement, standing still. The one
 /// that lands nearest to the surface wins, by its median over the particles; an earlier one wins unless a
-/// later one is clearly better.
-std::vector<char> carry(Particles& particles, const Surface& surface, const Tracker::Motion& motion);
+/// later one is clearly better. From there what is next to each other along `ring` moves as rigidly together
+/// as it can, see `register_to`: everywhere, or, when `motion` has won, where that misses the surface.
+std::vector<char> carry(Particles& particles, const Adjacency& ring, const Surface& surface,
+                        const Tracker::Motion& motion);
 
 }  // namespace isotrack

@@ -538,7 +538,7 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     {
         const StageTimer timer(frame.seconds, "carry");
         if (astray()) arrange();
-        const std::vector<char> found = carry(particles, surface, motion);
+        const std::vector<char> found = carry(particles, last_mesh.ring, surface, motion);
         particles.retain(found);
         last_mesh.retain(found);
         frame.lost = static_cast<std::size_t>(std::count(found.begin(), found.end(), 0));

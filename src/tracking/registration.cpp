@@ -1,0 +1,262 @@
+#include "tracking/registration.h"
+
+#include <Eigen/SVD>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "parallel_for_each.h"
+#include "surface/thread_probes.h"
+
+namespace isotrack {
+namespace {
+
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+
+constexpr std::size_t kPieceSize = 48,
+                      kMostPieces = 160;  // more of the latter where there are more components
+constexpr std::size_t kSamples = 24;      // of a piece
+constexpr int kMostSteps = 8;
+constexpr double kArrived = 0.01;    // resolutions off the surface, root mean square
+constexpr double kBetter = 0.98;     // times that of the step before
+constexpr double kStiffness = 0.2;   // of a pair of pieces, over the weight of the samples of one
+constexpr double kDamping = 1e-5;    // of a piece's motion, likewise
+constexpr double kSpread = 1e-6;     // across a piece over along it: less is a line, whose turn is not known
+constexpr double kLeastSlope = 0.3;  // of the gradient: less is the edge of the band, or between two sheets
+constexpr double kLeastWeight = 1e-9;  // of a particle's own piece
+constexpr double kSameWay = 0.5;       // cosine between the turned normal and the surface's
+
+/// Particles next to each other, and how they move together: x -> turn (x - middle) + middle + shift.
+struct Piece {
+    std::vector<int> particles;
+    std::vector<int> beside;  // pieces, ascending
+    Vec3 middle = Vec3::Zero(), shift = Vec3::Zero();
+    Mat3 turn = Mat3::Identity();
+
+    Vec3 moved(const Vec3& x) const { return turn * (x - middle) + middle + shift; }
+};
+
+/// The rigid motion nearest to that of its particles [Kabsch 1976].
+void move_as(const std::vector<Vec3>& from, const std::vector<Vec3>& to, Piece& piece) {
+    Vec3 middle = Vec3::Zero();
+    for (const int i : piece.particles) middle += to[i] / static_cast<double>(piece.particles.size());
+    Mat3 spread = Mat3::Zero();
+    for (const int i : piece.particles) spread += (to[i] - middle) * (from[i] - piece.middle).transpose();
+    const Eigen::JacobiSVD<Mat3> svd(spread, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    piece.shift = middle - piece.middle;
+    Mat3 mirror = Mat3::Identity();
+    if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) mirror(2, 2) = -1.0;
+    if (svd.singularValues()[1] > kSpread * svd.singularValues()[0])
+        piece.turn = svd.matrixU() * mirror * svd.matrixV().transpose();
+}
+
+/// Grown from particle to particle, in their order.
+std::vector<Piece> make_pieces(const Adjacency& ring, const std::vector<Vec3>& at) {
+    const std::size_t n = at.size(), size = std::max(kPieceSize, n / kMostPieces);
+    std::vector<int> piece_of(n, -1);
+    std::vector<Piece> pieces;
+    for (std::size_t first = 0; first < n; ++first) {
+        if (piece_of[first] >= 0) continue;
+        const int number = static_cast<int>(pieces.size());
+        std::vector<int> some{static_cast<int>(first)};
+        piece_of[first] = number;
+        int neighbour = -1;
+        for (std::size_t next = 0; next < some.size(); ++next)
+            for (const int j : ring.of(some[next])) {
+                if (piece_of[j] >= 0 && piece_of[j] != number) neighbour = piece_of[j];
+                if (piece_of[j] >= 0 || some.size() >= size) continue;
+                piece_of[j] = number;
+                some.push_back(j);
+            }
+        if (neighbour >= 0 && some.size() < size / 4) {  // what was left between others
+            for (const int i : some) piece_of[i] = neighbour;
+            auto& of_neighbour = pieces[neighbour].particles;
+            of_neighbour.insert(of_neighbour.end(), some.begin(), some.end());
+        } else {
+            pieces.emplace_back().particles = std::move(some);
+        }
+    }
+    for (std::size_t k = 0; k < pieces.size(); ++k) {
+        Piece& piece = pieces[k];
+        for (const int i : piece.particles) {
+            piece.middle += at[i] / static_cast<double>(piece.particles.size());
+            for (const int j : ring.of(i))
+                if (piece_of[j] != static_cast<int>(k)) piece.beside.push_back(piece_of[j]);
+        }
+        std::sort(piece.beside.begin(), piece.beside.end());
+        piece.beside.erase(std::unique(piece.beside.begin(), piece.beside.end()), piece.beside.end());
+    }
+    return pieces;
+}
+
+Mat3 cross_matrix(const Vec3& v) {
+    Mat3 m;
+    m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+    return m;
+}
+
+/// The normal equations of a piece's own samples, for a turn and a shift of where it is.
+struct Pull {
+    Mat6 squares = Mat6::Zero();
+    Vec6 products = Vec6::Zero();
+    double sum = 0.0, weight = 0.0;  // of squared residuals
+};
+
+Pull pull_of(const Piece& piece, const Particles& particles, double robust, Surface::Probe& probe) {
+    Pull pull;
+    const std::size_t step = 1 + (piece.particles.size() - 1) / kSamples;
+    const Vec3 centre = piece.middle + piece.shift;
+    for (std::size_t s = 0; s < piece.particles.size(); s += step) {
+        const int i = piece.particles[s];
+        const Vec3 x = piece.moved(particles.position[i]);
+        const Surface::Sample f = probe.sample(x);
+        const double slope = f.gradient.norm();
+        if (!(slope > kLeastSlope)) continue;
+        const Vec3 n = f.gradient / slope;
+        if (!(n.dot(piece.turn * particles.normal[i]) > kSameWay)) continue;
+        const double off = f.value / slope, relative = off / robust;
+        const double w = 1.0 / ((1.0 + relative * relative) * (1.0 + relative * relative));
+        Vec6 row;
+        row << (x - centre).cross(n), n;
+        pull.squares += w * row * row.transpose();
+        pull.products -= w * off * row;
+        pull.sum += off * off;
+        pull.weight += 1.0;
+    }
+    return pull;
+}
+
+/// The linear equations for all pieces together: their pulls, and what holds those beside each other.
+class Equations {
+public:
+    explicit Equations(std::size_t pieces)
+        : unknowns_(static_cast<Eigen::Index>(6 * pieces)), right_(Eigen::VectorXd::Zero(unknowns_)) {}
+
+    void add(const std::vector<Piece>& pieces, std::size_t k, const Pull& pull, double resolution) {
+        const Piece& piece = pieces[k];
+        constexpr double kWeight = static_cast<double>(kSamples);
+        double size2 = resolution * resolution;
+        for (const int l : piece.beside) {
+            // Where this piece would take the middle of the one beside it, less where that takes it.
+            const Piece& other = pieces[l];
+            const Vec3 arm = piece.turn * (other.middle - piece.middle),
+                       apart = piece.moved(other.middle) - (other.middle + other.shift);
+            Eigen::Matrix<double, 3, 6> here, there;
+            here << -cross_matrix(arm), Mat3::Identity();
+            there << Mat3::Zero(), -Mat3::Identity();
+            const double stiffness = kStiffness * kWeight;
+            const Mat6 across = stiffness * here.transpose() * there;
+            add_block(k, k, stiffness * here.transpose() * here);
+            add_block(k, l, across);
+            add_block(l, k, across.transpose());
+            add_block(l, l, stiffness * there.transpose() * there);
+            right_.segment<6>(static_cast<Eigen::Index>(6 * k)) -= stiffness * here.transpose() * apart;
+            right_.segment<6>(6 * l) -= stiffness * there.transpose() * apart;
+            size2 = std::max(size2, arm.squaredNorm());
+        }
+        Mat6 own = pull.squares;
+        own.diagonal().head<3>().array() += kDamping * kWeight * size2;
+        own.diagonal().tail<3>().array() += kDamping * kWeight;
+        add_block(k, k, own);
+        right_.segment<6>(static_cast<Eigen::Index>(6 * k)) += pull.products;
+    }
+
+    /// A turn and a shift for each piece; nothing where there is no answer.
+    Eigen::VectorXd solve() const {
+        Eigen::SparseMatrix<double> matrix(unknowns_, unknowns_);
+        matrix.setFromTriplets(entries_.begin(), entries_.end());
+        const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(matrix);
+        if (solver.info() != Eigen::Success) return {};
+        Eigen::VectorXd solution = solver.solve(right_);
+        if (!solution.allFinite()) solution.resize(0);
+        return solution;
+    }
+
+private:
+    template <typename Row, typename Column>
+    void add_block(Row row, Column column, const Mat6& block) {
+        for (int a = 0; a < 6; ++a)
+            for (int b = 0; b < 6; ++b)
+                entries_.emplace_back(6 * static_cast<int>(row) + a, 6 * static_cast<int>(column) + b,
+                                      block(a, b));
+    }
+
+    Eigen::Index unknowns_;
+    std::vector<Eigen::Triplet<double>> entries_;
+    Eigen::VectorXd right_;
+};
+
+/// Where the pieces take the particles, each by its own and those beside it.
+std::vector<Vec3> blended(const std::vector<Piece>& pieces, const std::vector<Vec3>& from) {
+    std::vector<Vec3> result(from.size());
+    parallel_for_each(pieces.size(), 4, [&](std::size_t k) {
+        const Piece& piece = pieces[k];
+        double width2 = 0.0;
+        for (const int l : piece.beside)
+            width2 +=
+                (pieces[l].middle - piece.middle).squaredNorm() / static_cast<double>(piece.beside.size());
+        for (const int i : piece.particles) {
+            result[i] = piece.moved(from[i]);
+            if (!(width2 > 0.0)) continue;
+            const auto weight_of = [&](const Piece& of) {
+                return std::exp(-2.0 * (from[i] - of.middle).squaredNorm() / width2);
+            };
+            double weights = kLeastWeight + weight_of(piece);
+            Vec3 sum = weights * result[i];
+            for (const int l : piece.beside) {
+                const double w = weight_of(pieces[l]);
+                sum += w * pieces[l].moved(from[i]);
+                weights += w;
+            }
+            result[i] = sum / weights;
+        }
+    });
+    return result;
+}
+
+}  // namespace
+
+std::optional<std::vector<Vec3>> register_to(const Surface& surface, const Particles& particles,
+                                             const Adjacency& ring, const std::vector<Vec3>& guess) {
+    const double resolution = surface.resolution();
+    std::vector<Piece> pieces = make_pieces(ring, particles.position);
+    for (Piece& piece : pieces) move_as(particles.position, guess, piece);
+    ThreadProbes probes(surface);
+    std::vector<Pull> pulls(pieces.size());
+    double robust = 2.0 * resolution, off_before = std::numeric_limits<double>::infinity();
+    for (int step = 0; step < kMostSteps; ++step) {
+        parallel_for_each(pieces.size(), 4, [&](std::size_t k) {
+            pulls[k] = pull_of(pieces[k], particles, robust, probes.local());
+        });
+        double sum = 0.0, weight = 0.0;
+        for (const Pull& pull : pulls) {
+            sum += pull.sum;
+            weight += pull.weight;
+        }
+        const double off = std::sqrt(sum / weight);  // not a number without any
+        if (!(off > kArrived * resolution && off < kBetter * off_before)) {
+            if (step == 0) return std::nullopt;
+            break;
+        }
+        off_before = off;
+        robust = std::max(resolution, 2.0 * off);
+        Equations equations(pieces.size());
+        for (std::size_t k = 0; k < pieces.size(); ++k) equations.add(pieces, k, pulls[k], resolution);
+        const Eigen::VectorXd solution = equations.solve();
+        if (solution.size() == 0) break;
+        for (std::size_t k = 0; k < pieces.size(); ++k) {
+            const Vec6 own = solution.segment<6>(static_cast<Eigen::Index>(6 * k));
+            const double angle = own.head<3>().norm();
+            if (angle > 0.0)
+                pieces[k].turn =
+                    Eigen::AngleAxisd(angle, own.head<3>() / angle).toRotationMatrix() * pieces[k].turn;
+            pieces[k].shift += own.tail<3>();
+        }
+    }
+    return blended(pieces, particles.position);
+}
+
+}  // namespace isotrack
