@@ -6,16 +6,11 @@
 #include "isotrack/meshing/certify.h"
 #include "meshing/crossing_triangles.h"
 #include "meshing/sharpness.h"
+#include "meshing/stands_for.h"
 #include "meshing/triangle_box.h"
 #include "sampling/compact.h"
 
 namespace isotrack {
-namespace {
-
-constexpr double kOwn = 1.03;  // of the tolerance: what is that near is of a triangle
-
-}  // namespace
-
 double BluntedMesh::sharpness_of(const Triangle& t) const {
     return sharpness(points[t[0]], points[t[1]], points[t[2]]);
 }
@@ -53,36 +48,12 @@ Replaced BluntedMesh::replaced(std::vector<int> numbers) const {
     return result;
 }
 
-/// What is farther from the old triangles than the tolerance is the concern of others.
 bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>& candidates) {
     std::vector<FacingTriangle> after;
     for (const Triangle& t : candidates) after.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
-    const double own2 = kOwn * tolerance * kOwn * tolerance, tolerance2 = tolerance * tolerance;
-    const Vec3 reach = Vec3::Constant(kOwn * tolerance);
-    bool all = true;
-    const auto check = [&](const Surface::Crossing& crossing) {
-        double least = own2;
-        bool own = false;
-        for (const FacingTriangle& t : before.triangles) {
-            const double d2 = t.squared_distance(crossing, least);
-            if (d2 > least) continue;
-            least = d2;
-            own = true;
-        }
-        if (!own) return;
-        const double limit = std::max(least, tolerance2);
-        const auto reaches = [&](const FacingTriangle& t) {
-            return t.squared_distance(crossing, limit) <= limit;
-        };
-        all = std::any_of(after.begin(), after.end(), reaches) ||
-              std::any_of(before.beside.begin(), before.beside.end(), reaches);
-    };
-    for (const CrossingGrid* points_there : reached)
-        points_there->for_each_in(Box(before.box.min() - reach, before.box.max() + reach),
-                                  [&](std::size_t c) {
-                                      if (all) check((*points_there)[c]);
-                                  });
-    return all;
+    return std::all_of(reached.begin(), reached.end(), [&](const CrossingGrid* points_there) {
+        return stand_for_same(*points_there, before.triangles, before.box, after, before.beside, tolerance);
+    });
 }
 
 bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replaced& before) {

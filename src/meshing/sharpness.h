@@ -8,8 +8,8 @@
 namespace isotrack {
 
 /// Of triangles with this smallest angle.
-constexpr double kSharpnessAt30Degrees = 1.7320508075688772, kSharpnessAt22Degrees = 2.4751,
-                 kSharpnessAt18Degrees = 3.0777;
+constexpr double kSharpnessAt31Degrees = 1.6643, kSharpnessAt30Degrees = 1.7320508075688772,
+                 kSharpnessAt22Degrees = 2.4751, kSharpnessAt18Degrees = 3.0777;
 
 /// Cotangent of the smallest angle: 1.73 at 30 degrees, infinite without area.
 inline double sharpness(const Vec3& p, const Vec3& q, const Vec3& r) {

@@ -49,16 +49,11 @@ std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacen
     };
     const auto crowded = smallest_first(particles.size(), nearest_square, band.crowded * band.crowded);
     std::vector<char> keep(particles.size(), 1);
-    std::vector<int> dying;
     for (const auto& [q, i] : crowded) {
         bool neighbour_went = false;
         for (const int j : adjacency.of(i)) neighbour_went = neighbour_went || !keep[j];
-        if (neighbour_went) continue;
-        keep[i] = 0;
-        dying.push_back(i);
+        if (!neighbour_went) keep[i] = 0;
     }
-    const auto deaths = static_cast<std::size_t>(std::ceil(band.deaths * static_cast<double>(dying.size())));
-    for (std::size_t d = deaths; d < dying.size(); ++d) keep[dying[d]] = 1;
     return keep;
 }
 

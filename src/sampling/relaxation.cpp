@@ -17,20 +17,24 @@ constexpr int kLongestBlock = 16;
 
 }  // namespace
 
-int relax(Particles& particles, const Adjacency& adjacency, const Surface& surface, int sweeps) {
+int relax(Particles& particles, const Adjacency& adjacency, const Surface& surface, int sweeps,
+          const std::vector<char>& restless) {
     const auto groups = colour_groups(adjacency, kLongestBlock);
     ThreadProbes probes(surface);
     std::vector<Metric> metrics;
     metrics.reserve(particles.size());
     for (std::size_t i = 0; i < particles.size(); ++i) metrics.push_back(metric_of(particles, i));
     std::vector<double> lambda(particles.size(), 0.1);
-    std::vector<char> moved(particles.size(), 1), active(particles.size(), 1);
+    std::vector<char> moved(particles.size(), 1), met(particles.size(), 0);
+    std::vector<char> active = restless;
+    if (active.empty()) active.assign(particles.size(), 1);
     std::vector<Crease> crease(particles.size());
     int done = 0;
     const auto step = [&](int i, Surface::Probe& probe) {
-        // Who is on a crease in the first sweep is brought back to it in the next ones.
-        if (done == 0 || crease[i].kind != Crease::Kind::None)
+        // Who is on a crease in its first sweep is brought back to it in the next ones.
+        if (!met[i] || crease[i].kind != Crease::Kind::None)
             crease[i] = pull_to_crease(particles, adjacency.of(i), i, surface.resolution(), probe);
+        met[i] = 1;
         if (crease[i].kind == Crease::Kind::Corner) return false;
         const Vec3* along = crease[i].kind == Crease::Kind::Line ? &crease[i].along : nullptr;
         return descend(particles, metrics, adjacency.of(i), i, lambda[i], probe, along).moved >
@@ -43,6 +47,7 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
                 tbb::blocked_range<std::size_t>(0, active.size(), 1024), [&](const auto& range) {
                     for (std::size_t i = range.begin(); i < range.end(); ++i) {
                         const Adjacency::Range near = adjacency.of(i);
+                        if (!restless.empty() && !restless[i]) continue;
                         active[i] = moved[i] || std::any_of(near.begin(), near.end(),
                                                             [&](int j) { return moved[j] != 0; });
                     }

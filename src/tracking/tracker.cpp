@@ -20,7 +20,7 @@
 #include "isotrack/sampling/population.h"
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
-#include "sampling/compact.h"
+#include "meshing/sharpness.h"
 #include "surface/float_precision.h"
 #include "tracking/carry.h"
 #include "tracking/failing.h"
@@ -35,6 +35,7 @@
 #include "tracking/relabelling.h"
 #include "tracking/specks.h"
 #include "tracking/stage_timer.h"
+#include "tracking/thinning.h"
 
 namespace isotrack {
 namespace {
@@ -52,10 +53,11 @@ struct Pace {
     int sweeps;
 };
 constexpr Pace kAtFirst{{}, 0.3, 5}, kDenseAtFirst{{}, 0.3, 7};
-constexpr Pace kFollowing{{0.6, 0.85}, 0.6, 3};  // ids live longer, and so does what certify added last
-// Of the particles: when more are lost with the surface they were on, the rest changes slowly, too.
-constexpr double kManyLost = 0.03;
-constexpr double kDeathsThen = 0.5;
+// What the mesh can do without goes sooner; where it is too coarse certify finds better places.
+constexpr Pace kFollowing{{0.7, 1.1}, 0.3, 3};
+constexpr double kThinned = 0.85;      // of the tolerance: error of triangles that close the gap of a death
+constexpr double kUnfitted = 1.6;      // times what a fit leaves of an error
+constexpr int kMostLayers = 4;         // of newborn around those that move
 constexpr double kFewWithError = 0.9;  // of the particles: smooth surfaces have more
 constexpr double kMostSeeded = 0.05;   // of the particles; with more the next frame is half a cold start
 constexpr double kDetail = 2.0;        // tolerances
@@ -96,6 +98,7 @@ struct Tracker::Impl {
     CellLabels labels;
     std::vector<Id> in_dt;  // the particles whose DT it is
     Id first_astray = 0;    // those born since the particles were arranged
+    Id first_of_frame = 0;  // those born since the last frame
     LastMesh last_mesh;
 
     explicit Impl(const TrackerOptions& o) : options(o) {
@@ -219,25 +222,34 @@ struct Tracker::Impl {
         return {particles, surface, l.detail, least, l.max_edge, most, next_id};
     }
 
-    /// The newborn move like the neighbours that were there before; alone among newborn they rest.
-    void inherit_velocities(const std::vector<Triangle>& triangles, Id first_new) {
-        std::vector<int> count(particles.size(), 0);
-        const auto is_new = [&](int i) { return particles.id[i] >= first_new; };
-        for (std::size_t i = 0; i < particles.size(); ++i)
-            if (is_new(static_cast<int>(i))) particles.velocity[i].setZero();
-        for (const Triangle& t : triangles)
-            for (const int i : t)
-                for (const int j : t) {
-                    if (!is_new(i) || is_new(j)) continue;
-                    particles.velocity[i] += particles.velocity[j];
-                    ++count[i];
-                }
-        for (std::size_t i = 0; i < particles.size(); ++i)
-            if (count[i] > 0) particles.velocity[i] /= count[i];
+    /// The newborn move like the neighbours that were there before, or like those of these; farther from all
+    /// of them they rest.
+    void inherit_velocities(const std::vector<Triangle>& triangles) {
+        std::vector<char> moves(particles.size());
+        for (std::size_t i = 0; i < particles.size(); ++i) {
+            moves[i] = particles.id[i] < first_of_frame;
+            if (!moves[i]) particles.velocity[i].setZero();
+        }
+        for (int layer = 0; layer < kMostLayers; ++layer) {
+            std::vector<int> count(particles.size(), 0);
+            for (const Triangle& t : triangles)
+                for (const int i : t)
+                    for (const int j : t) {
+                        if (moves[i] || !moves[j]) continue;
+                        particles.velocity[i] += particles.velocity[j];
+                        ++count[i];
+                    }
+            for (std::size_t i = 0; i < particles.size(); ++i) {
+                if (count[i] == 0) continue;
+                particles.velocity[i] /= count[i];
+                moves[i] = 1;
+            }
+        }
     }
 
-    void follow(const Surface& surface, const SizingLimits& l, const Pace& pace, bool warm,
-                TrackedFrame& frame);
+    void follow(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
+                const Pace& pace, bool warm, TrackedFrame& frame);
+    std::vector<char> restless(double detail) const;
     void make_room(const Surface& surface, TrackedFrame& frame);
     void measure(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
     void seed(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, double apart,
@@ -290,7 +302,7 @@ void Tracker::Impl::sample(const Surface& surface, const CrossingGrid& crossings
     const int rounds = dense ? kDenseRounds : kRounds;
     for (int round = 0; round < rounds; ++round) {
         if (round > 0) measure(surface, l, frame);
-        follow(surface, l, dense ? kDenseAtFirst : kAtFirst, warm, frame);
+        follow(surface, crossings, l, dense ? kDenseAtFirst : kAtFirst, warm, frame);
         if (!warm) arrange();
     }
 }
@@ -304,9 +316,10 @@ void Tracker::Impl::make_room(const Surface& surface, TrackedFrame& frame) {
     frame.sweeps += relax(particles, last_mesh.ring.squared(), surface, kMendingSweeps);
 }
 
-/// Spacing, births and deaths, then sweeps, by what the last mesh knows: no DT is needed.
-void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const Pace& pace, bool warm,
-                           TrackedFrame& frame) {
+/// Spacing, births and deaths, then sweeps, by what the last mesh knows: no DT is needed. Where particles
+/// were before this frame none goes unless the mesh can do without it, and none moves without need.
+void Tracker::Impl::follow(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
+                           const Pace& pace, bool warm, TrackedFrame& frame) {
     {
         const StageTimer timer(frame.seconds, "size");
         last_mesh.grow(particles.size());
@@ -315,17 +328,37 @@ void Tracker::Impl::follow(const Surface& surface, const SizingLimits& l, const 
         update_spacing(particles, last_mesh.ring, last_mesh.evidence, paced);
     }
     const StageTimer timer(frame.seconds, "relax");
-    PopulationBand band = pace.band;
-    if (warm && static_cast<double>(frame.lost) > kManyLost * static_cast<double>(particles.size()))
-        band.deaths = kDeathsThen;
-    auto keep = uncrowded(particles, last_mesh.ring, band);
+    std::vector<char> keep;
+    if (warm) {
+        const double enough = (options.fit ? kUnfitted : 1.0) * l.tolerance;
+        keep = thin(particles, last_mesh.triangles, surface, crossings,
+                    {pace.band.crowded, kThinned * enough, kCertified * enough, l.detail});
+        last_mesh.ring = ring_of(last_mesh.triangles, particles.size());
+    } else {
+        keep = uncrowded(particles, last_mesh.ring, pace.band);
+    }
     const std::vector<Triangle> parents =
         fill_sparse(particles, last_mesh.triangles, last_mesh.ring, surface, next_id, pace.band);
     last_mesh.grow(particles.size(), parents);
     keep.resize(particles.size(), 1);
     particles.retain(keep);
     last_mesh.retain(keep);
-    frame.sweeps += relax(particles, last_mesh.ring.squared(), surface, pace.sweeps);
+    frame.sweeps += relax(particles, last_mesh.ring.squared(), surface, pace.sweeps,
+                          warm ? restless(l.detail) : std::vector<char>());
+}
+
+/// Those around triangles that are too sharp, the newborn, and those next to them.
+std::vector<char> Tracker::Impl::restless(double detail) const {
+    std::vector<char> result(particles.size());
+    const auto is_new = [&](int i) { return particles.id[i] >= first_of_frame; };
+    for (std::size_t i = 0; i < particles.size(); ++i) result[i] = is_new(static_cast<int>(i));
+    const auto& at = particles.position;
+    for (const Triangle& t : last_mesh.triangles)
+        if (std::any_of(t.begin(), t.end(), is_new) ||
+            (is_sharper(kSharpnessAt31Degrees, at[t[0]], at[t[1]], at[t[2]]) &&
+             angles_matter(particles, t, detail)))
+            for (const int i : t) result[i] = 1;
+    return result;
 }
 
 void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm,
@@ -553,7 +586,7 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
     else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))
-        follow(surface, l, kFollowing, warm, frame);
+        follow(surface, *work.crossings, l, kFollowing, warm, frame);
     else
         sample(surface, *work.crossings, l, warm, frame);
 }
@@ -578,7 +611,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     frame.tolerance = effective_tolerance(options, surface);
     frame.delaunay_strategy = name_of(strategy());
     const std::size_t relocated = dt->profile().relocated, before = particles.size();
-    const Id first_new = next_id;
+    first_of_frame = next_id;
 
     place_particles(motion, *work);
     {  // which frees what is of no use to a mesh that passes
@@ -586,12 +619,15 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         making.mesh_particles();
         making.certify();
         making.patch();
+        if (options.method != Method::Paper)  // the next births and deaths go by what is left of errors
+            last_mesh.evidence.error =
+                errors_at_particles(work->mesh, *work->inspection.errors, particles.size());
     }
     frame.relocated += dt->profile().relocated - relocated;
-    inherit_velocities(particle_triangles(work->mesh.carved), first_new);
+    inherit_velocities(particle_triangles(work->mesh.carved));
     name_vertices(work->mesh, frame.mesh);
     frame.particles = particles.size();
-    for (const Id id : particles.id) frame.born += id >= first_new;
+    for (const Id id : particles.id) frame.born += id >= first_of_frame;
     frame.died = before + frame.born - particles.size();
     if (options.border == Border::Close) return [work, options = options] { return work->finish(options); };
 

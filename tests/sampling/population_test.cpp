@@ -37,31 +37,6 @@ TEST(Uncrowded, DropsCrowdedParticlesButNoTwoNeighbours) {
     EXPECT_GT(dropped, 50u);
 }
 
-TEST(Uncrowded, DropsTheShareOfThemThatTheBandSaysMostCrowdedFirst) {
-    const Particles particles = random_on_unit_sphere(600, 0.15);
-    const Adjacency adjacency = adjacency_of(particles);
-    const auto dropped = [&](double share) {
-        const auto keep = uncrowded(particles, adjacency, {0.65, 0.85, share});
-        std::vector<std::size_t> result;
-        for (std::size_t i = 0; i < keep.size(); ++i)
-            if (!keep[i]) result.push_back(i);
-        return result;
-    };
-    const std::size_t all = dropped(1.0).size();
-    ASSERT_GT(all, 100u);
-    EXPECT_EQ(dropped(0.5).size(), (all + 1) / 2);
-    EXPECT_TRUE(dropped(0.0).empty());
-    std::vector<char> is_first(particles.size(), 0);
-    double farthest = 0.0, nearest = 1.0;
-    for (const std::size_t i : dropped(0.5)) {
-        is_first[i] = 1;
-        farthest = std::max(farthest, nearest_distance(particles, i));
-    }
-    for (const std::size_t i : dropped(1.0))
-        if (!is_first[i]) nearest = std::min(nearest, nearest_distance(particles, i));
-    EXPECT_LE(farthest, nearest);
-}
-
 TEST(Uncrowded, LeavesAGoodPackingAlone) {
     const Particles particles = settled_on_unit_sphere(400, 0.19);
     const auto keep = uncrowded(particles, adjacency_of(particles));

@@ -320,7 +320,7 @@ TEST(Tracker, GivesTheDisplacementAsVelocity) {
             }
             double sum = 0.0;
             for (std::size_t v = 0; v < frame.mesh.points.size(); ++v) {
-                // Without a velocity field only the motion along the normal is known.
+                // Without a velocity field nothing shows whether a sphere turns.
                 const Vec3 n = (frame.mesh.points[v] - centre).normalized();
                 const Vec3 error = frame.mesh.velocities[v] - step;
                 const double e = (told ? error.norm() : std::abs(error.dot(n))) / step.norm();
@@ -330,6 +330,74 @@ TEST(Tracker, GivesTheDisplacementAsVelocity) {
             EXPECT_LT(sum / static_cast<double>(frame.mesh.points.size()), told ? 0.01 : 0.05)
                 << "frame " << f;
         }
+    }
+}
+
+TEST(Tracker, GivesTheMotionAlongTheSurfaceAsVelocity) {
+    // Nobody tells how it moves, and most of it moves along itself.
+    const auto solid = shapes::ellipsoid({0, 0, 0}, {0.6, 0.42, 0.27}, kVoxel);
+    const Eigen::AngleAxisd turn(0.06, Vec3(0.2, 0.3, 1.0).normalized());
+    Eigen::Isometry3d place = Eigen::Isometry3d::Identity(), before = place;
+    Tracker tracker(with_tolerance(0.005));
+    for (int f = 0; f < 6; ++f) {
+        const TrackedFrame frame = tracker.advance(*shapes::moved(solid, place));
+        if (f > 0) {
+            double sum = 0.0, moved = 0.0;
+            for (std::size_t v = 0; v < frame.mesh.points.size(); ++v) {
+                const Vec3& p = frame.mesh.points[v];
+                const Vec3 truth = p - before * place.inverse() * p;
+                sum += (frame.mesh.velocities[v] - truth).norm();
+                moved += truth.norm();
+            }
+            EXPECT_LT(sum, 0.05 * moved) << "frame " << f;
+        }
+        before = place;
+        place = turn * place;
+    }
+}
+
+TEST(Tracker, RestsWhereTheSurfaceRests) {
+    const SurfacePtr solids[] = {shapes::torus({0.01, 0, 0}, 0.5, 0.2, kVoxel),
+                                 shapes::box({0, 0.01, 0}, {0.5, 0.4, 0.3}, kVoxel)};
+    for (const SurfacePtr& solid : solids) {
+        const LevelSet level_set(rasterise(*solid, kVoxel));
+        Tracker tracker(with_tolerance(0.5 * kVoxel));
+        TrackedFrame before;
+        for (int f = 0; f < 12; ++f) {
+            TrackedFrame frame = tracker.advance(level_set);
+            EXPECT_TRUE(frame.within_tolerance);
+            if (f >= 6) {
+                EXPECT_LE(static_cast<double>(frame.born + frame.died),
+                          0.01 * static_cast<double>(frame.particles));
+                std::map<Id, Vec3> was;
+                for (std::size_t v = 0; v < before.mesh.ids.size(); ++v)
+                    was[before.mesh.ids[v]] = before.mesh.points[v];
+                std::size_t at_rest = 0;
+                for (std::size_t v = 0; v < frame.mesh.ids.size(); ++v) {
+                    const auto found = was.find(frame.mesh.ids[v]);
+                    at_rest += found != was.end() && found->second == frame.mesh.points[v];
+                }
+                EXPECT_GE(static_cast<double>(at_rest), 0.95 * static_cast<double>(frame.mesh.ids.size()))
+                    << f;
+            }
+            before = std::move(frame);
+        }
+    }
+}
+
+TEST(Tracker, NeedsHardlyMoreTrianglesThanFromTheStartAfterManyFrames) {
+    const auto solid = shapes::box({0, 0, 0}, {0.5, 0.4, 0.3}, kVoxel);
+    Tracker tracker(with_tolerance(0.5 * kVoxel));
+    for (int f = 0;; ++f) {
+        const Eigen::Isometry3d place(Eigen::AngleAxisd(0.05 * f, Vec3(1, 2, 3).normalized()));
+        const LevelSet level_set(rasterise(*shapes::moved(solid, place), kVoxel));
+        const TrackedFrame frame = tracker.advance(level_set);
+        EXPECT_TRUE(frame.within_tolerance) << f;
+        if (f < 12) continue;
+        Tracker anew(with_tolerance(0.5 * kVoxel));
+        EXPECT_LT(static_cast<double>(frame.mesh.triangles.size()),
+                  1.25 * static_cast<double>(anew.advance(level_set).mesh.triangles.size()));
+        break;
     }
 }
 

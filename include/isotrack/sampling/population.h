@@ -17,11 +17,10 @@ namespace isotrack {
 struct PopulationBand {
     double crowded = 0.65;  ///< Delete below this distance to the nearest neighbour.
     double sparse = 0.85;   ///< Insert where a triangle's circumradius is above this.
-    double deaths = 1.0;    ///< Share that is deleted of those that are to be, in [0, 1].
 };
 
 /// Flags for `Particles::retain`: drops particles whose nearest neighbour facing the same way is too near,
-/// most crowded first, no two neighbours at once, and of those the share that the band says.
+/// most crowded first, no two neighbours at once.
 std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency,
                             const PopulationBand& band = {});
 

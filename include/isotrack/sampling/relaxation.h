@@ -14,8 +14,10 @@ namespace isotrack {
 /// of the surface within 0.4 of its spacing when the first sweep comes to it is put on it and moves along it
 /// alone, brought back to it by each sweep; one that has a corner there stays in it. A particle rests when
 /// neither it nor a neighbour moved by more than 0.05 sigma in the last sweep (the paper's threshold); ends
-/// early when all rest. Blocks of particles of one colour move at the same time: the same result at any
-/// thread count. Returns the sweeps made.
-int relax(Particles& particles, const Adjacency& adjacency, const Surface& surface, int sweeps);
+/// early when all rest. Of `restless`, a flag for each, only those that are set move; all when it is empty.
+/// Blocks of particles of one colour move at the same time: the same result at any thread count. Returns the
+/// sweeps made.
+int relax(Particles& particles, const Adjacency& adjacency, const Surface& surface, int sweeps,
+          const std::vector<char>& restless = {});
 
 }  // namespace isotrack
