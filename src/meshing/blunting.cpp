@@ -86,7 +86,8 @@ Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, st
       tolerance_(tolerance),
       detail_(detail.value_or(surface.resolution())),
       open_(points.size(), 1),
-      unchecked_(triangles.size(), 0) {}
+      unchecked_(triangles.size(), 0),
+      searched_(triangles.size(), 0) {}
 Blunter::~Blunter() = default;
 
 bool Blunter::run(int passes) {
@@ -114,17 +115,10 @@ bool Blunter::pass() {
     std::sort(sharp.begin(), sharp.end());
     const std::size_t before = changes_.size();
     const auto probe = surface_.probe();
-    BluntedMesh mesh{points_,
-                     triangles_,
-                     Corners(points_.size(), triangles_),
-                     movable_,
-                     fixed_,
-                     tolerance_,
-                     detail_,
-                     *probe,
-                     reached_,
-                     lost_,
-                     std::vector<char>(points_.size(), 0),
+    BluntedMesh mesh{points_,  triangles_, Corners(points_.size(), triangles_),
+                     movable_, fixed_,     tolerance_,
+                     detail_,  *probe,     reached_,
+                     lost_,    searched_,  std::vector<char>(points_.size(), 0),
                      boxes_};
     for (const auto& [sharpest, t] : sharp) {
         for (const int v : triangles_[t])
@@ -135,6 +129,7 @@ bool Blunter::pass() {
         for (const int changed : change->triangle) {
             if (boxes_) boxes_->note(changed);
             unchecked_[changed] = 1;
+            searched_[changed] = 0;
             for (const int v : triangles_[changed]) open_[v] = 1;
         }
         changes_.push_back(std::move(*change));
@@ -173,6 +168,7 @@ void Blunter::undo(const std::vector<char>& marked) {
         const Blunting& change = changes_[c];
         for (std::size_t i = 0; i < change.triangle.size(); ++i) {
             triangles_[change.triangle[i]] = change.before[i];
+            searched_[changes_[c].triangle[i]] = 0;
             unchecked_[change.triangle[i]] = 1;
         }
         for (const Triangle& t : change.before)

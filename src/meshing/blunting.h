@@ -36,8 +36,9 @@ struct BluntedMesh {
     Surface::Probe& probe;
     const std::vector<const CrossingGrid*>& reached;
     std::set<std::pair<int, int>>&
-        lost;                   ///< Edges, ascending, that may come back and are not to be made anew.
-    std::vector<char> touched;  ///< Per vertex: a change is near.
+        lost;                     ///< Edges, ascending, that may come back and are not to be made anew.
+    std::vector<char>& searched;  ///< Per triangle: in vain, as it is.
+    std::vector<char> touched;    ///< Per vertex: a change is near.
     std::unique_ptr<TriangleBoxes>& boxes;  ///< Made when they are asked for.
 
     double sharpness_of(const Triangle& t) const;

@@ -331,12 +331,13 @@ void measure_crossings(const std::vector<Vec3>& points, const std::vector<Triang
     const auto search = [&](const std::vector<Triangle>& near, const std::vector<char>* columns,
                             double reach) {
         for_each_block(near.size(), [&](std::size_t t) {
-            const auto& [i, j, k] = near[t];
-            const FacingTriangle triangle(points[i], points[j], points[k]);
+            std::optional<FacingTriangle> triangle;  // most are far from all that is wanted when little is
             const auto measure = [&](std::size_t c) {
                 if (!wanted[c]) return;
+                const auto& [i, j, k] = near[t];
+                if (!triangle) triangle.emplace(points[i], points[j], points[k]);
                 LeastSquare& found = least[place(c)];
-                found.take(triangle.squared_distance(grid[c], std::min(reach * reach, found.get())));
+                found.take(triangle->squared_distance(grid[c], std::min(reach * reach, found.get())));
             };
             grid.for_each_in(box_around(near[t], reach), measure, columns);
         });

@@ -19,6 +19,7 @@ constexpr double kFirstStep = 0.3, kLastStep = 0.02;  // of the mean edge
 constexpr int kHalvings = 2;                          // of a move that leaves the tolerance
 constexpr double kFitted = 0.01;                      // tolerances: what is that far off may be farther off
 constexpr double kLift = 0.25;                        // tolerances: so far up or down
+constexpr double kShort = 0.5;                        // details: longest edge of what is not worth it
 
 /// The triangles around a vertex.
 struct Star {
@@ -78,6 +79,13 @@ std::vector<Triangle> triangles_of(const Star& star, const BluntedMesh& mesh) {
     return result;
 }
 
+double longest_edge(const BluntedMesh& mesh, int triangle) {
+    const auto& [a, b, c] = mesh.triangles[triangle];
+    const auto& at = mesh.points;
+    return std::sqrt(std::max(
+        {(at[b] - at[a]).squaredNorm(), (at[c] - at[b]).squaredNorm(), (at[a] - at[c]).squaredNorm()}));
+}
+
 /// For what nothing cheaper helps: a pattern search in space over the places that the mesh may have, for each
 /// corner; the bluntest counts.
 std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
@@ -91,8 +99,12 @@ std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
         const std::vector<Triangle> around = triangles_of(star, mesh);
         const Replaced before = mesh.replaced(star.triangle);
         const Vec3 from = points[v], reach = Vec3::Constant(star.mean_edge);
-        const std::vector<Triangle> others =
-            mesh.near(Box(before.box.min() - reach, before.box.max() + reach), star.triangle);
+        std::optional<std::vector<Triangle>> others;  // nearby
+        const auto crosses_others = [&] {
+            if (!others)
+                others = mesh.near(Box(before.box.min() - reach, before.box.max() + reach), star.triangle);
+            return any_cross(points, around, *others);
+        };
         Vec3 best = from;
         double least = star.sharpness_at(from);
         const double enough = worth(least);
@@ -109,7 +121,7 @@ std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
                       [](const auto& p, const auto& q) { return p.first < q.first; });
             const auto found = std::find_if(blunter.begin(), blunter.end(), [&](const auto& candidate) {
                 points[v] = candidate.second;
-                return mesh.may_have(around, before) && !any_cross(points, around, others);
+                return mesh.may_have(around, before) && !crosses_others();
             });
             if (found == blunter.end())
                 step *= 0.5;
@@ -132,6 +144,7 @@ std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
 }  // namespace
 
 std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness) {
+    if (longest_edge(mesh, triangle) < kShort * mesh.detail) return std::nullopt;
     auto& points = mesh.points;
     struct Move {
         int vertex;
@@ -171,7 +184,10 @@ std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness)
             }
         }
     }
-    return sharpness > kSharpnessAt18Degrees ? search(mesh, triangle) : std::nullopt;
+    if (!(sharpness > kSharpnessAt18Degrees) || mesh.searched[triangle]) return std::nullopt;
+    auto found = search(mesh, triangle);
+    mesh.searched[triangle] = !found;
+    return found;
 }
 
 }  // namespace isotrack

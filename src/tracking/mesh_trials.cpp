@@ -47,7 +47,13 @@ bool MeshTrials::try_to_mend(FrameMesh other) {
 void MeshTrials::put_back(FrameMesh mesh) {
     mesh_ = std::move(mesh);
     inspection_ = inspector_.inspect_both_ways(mesh_);
-    inspector_.inspect_topology(mesh_, inspection_);
+    is_topology_known_ = false;
+}
+
+const LatticeTopology& MeshTrials::topology() {
+    if (!is_topology_known_) inspector_.inspect_topology(mesh_, inspection_);
+    is_topology_known_ = true;
+    return inspection_.topology;
 }
 
 double MeshTrials::largest_allowed() const {
@@ -67,9 +73,9 @@ bool MeshTrials::take(FrameMesh other, std::size_t most_failing) {
                       failing_in(after, limits_.tolerance).size() <= most_failing &&
                       inspector_.newly_missed(after, mesh_.vertices, mesh_.carved.triangles).empty();
     if (good) {
-        inspector_.inspect_topology(other, after);
         mesh_ = std::move(other);
         inspection_ = std::move(after);
+        is_topology_known_ = false;
     } else {
         // What it saw last was another, for which it may have looked at more points.
         Inspection now = inspector_.inspect_both_ways(mesh_);

@@ -15,7 +15,10 @@ public:
         : mesh_(mesh), inspection_(inspection), inspector_(inspector), limits_(limits) {}
 
     const FrameMesh& mesh() const { return mesh_; }
+    /// Without its topology.
     const Inspection& inspection() const { return inspection_; }
+    /// Looked at when it is asked for: it takes as long as a trial.
+    const LatticeTopology& topology();
     /// It saw the mesh last.
     Inspector& inspector() { return inspector_; }
 
@@ -39,6 +42,7 @@ private:
     Inspection& inspection_;
     Inspector& inspector_;
     const SizingLimits& limits_;
+    bool is_topology_known_ = true;
 };
 
 /// Of the triangles.

@@ -276,8 +276,7 @@ private:
 std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface,
                            Effort& effort) {
     const double resolution = surface.resolution();
-    std::vector<Vec3> places =
-        suspicious_places(trials.mesh(), trials.inspection().topology, thickness, resolution);
+    std::vector<Vec3> places = suspicious_places(trials.mesh(), trials.topology(), thickness, resolution);
     const auto euler = surface.lattice_euler();
     if (!euler || (places.empty() && euler_of(trials.mesh()) == *euler)) return 0;
     const auto count_wanted = surface.lattice_component_count();
@@ -371,8 +370,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
 std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface) {
     const double resolution = surface.resolution();
     std::vector<Vec3> places = apart(trials.failing_places(), kApart * resolution), around;
-    if (places.empty()) return 0;
-    if (places.size() > kMostFailing) places.resize(kMostFailing);
+    if (places.empty() || places.size() > kMostFailing) return 0;  // some less would make it no better
     const auto is_near = [&](const Vec3& place, double distance) {
         return std::any_of(places.begin(), places.end(),
                            [&](const Vec3& other) { return (other - place).norm() < distance * resolution; });

@@ -147,7 +147,7 @@ std::size_t join_specks(MeshTrials& trials, CellLabels& labels, const Carve& car
                         const Particles& particles, const Surface& surface, const SizingLimits& limits) {
     // Those that something is near to which is missed without all of them.
     const auto needed = [&] {
-        std::vector<char> specks = trials.inspection().topology.speck, removed = specks;
+        std::vector<char> specks = trials.topology().speck, removed = specks;
         if (!any(specks)) return specks;
         const Rest rest = without_and_inspected(specks, trials.mesh(), trials.inspector());
         spare_near(rest.newly_missed, limits.tolerance, trials.mesh(), removed);
@@ -185,6 +185,7 @@ std::size_t join_specks(MeshTrials& trials, CellLabels& labels, const Carve& car
             refused.insert(part.begin(), part.end());
         }
     }
+    trials.topology();
     return joined;
 }
 

@@ -14,7 +14,8 @@ using Carve = std::function<FrameMesh(CellLabels&)>;
 /// Joins specks that are needed, because they are near to what would be missed without them, with another
 /// part of the mesh: by cells on the way to its next inside cell on which the outside ones go least far
 /// outside, and no farther than the tolerance. That is wanted where it makes one component of two. Looks at
-/// a few specks per call. `labels`: those that the mesh was carved from. Returns how many were joined.
+/// a few specks per call; the topology of `trials` is known afterwards. `labels`: those that the mesh was
+/// carved from. Returns how many were joined.
 std::size_t join_specks(MeshTrials& trials, CellLabels& labels, const Carve& carve, const Tetrahedra& cells,
                         const Particles& particles, const Surface& surface, const SizingLimits& limits);
 
