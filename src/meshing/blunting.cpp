@@ -11,6 +11,12 @@
 #include "sampling/compact.h"
 
 namespace isotrack {
+namespace {
+
+constexpr long kShortOnes = 500;
+constexpr std::size_t kTrianglesPerShortOne = 100;
+
+}  // namespace
 double BluntedMesh::sharpness_of(const Triangle& t) const {
     return sharpness(points[t[0]], points[t[1]], points[t[2]]);
 }
@@ -87,7 +93,8 @@ Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, st
       detail_(detail.value_or(surface.resolution())),
       open_(points.size(), 1),
       unchecked_(triangles.size(), 0),
-      searched_(triangles.size(), 0) {}
+      searched_(triangles.size(), 0),
+      short_ones_left_(kShortOnes + static_cast<long>(triangles.size() / kTrianglesPerShortOne)) {}
 Blunter::~Blunter() = default;
 
 bool Blunter::run(int passes) {
@@ -115,10 +122,19 @@ bool Blunter::pass() {
     std::sort(sharp.begin(), sharp.end());
     const std::size_t before = changes_.size();
     const auto probe = surface_.probe();
-    BluntedMesh mesh{points_,  triangles_, Corners(points_.size(), triangles_),
-                     movable_, fixed_,     tolerance_,
-                     detail_,  *probe,     reached_,
-                     lost_,    searched_,  std::vector<char>(points_.size(), 0),
+    BluntedMesh mesh{points_,
+                     triangles_,
+                     Corners(points_.size(), triangles_),
+                     movable_,
+                     fixed_,
+                     tolerance_,
+                     detail_,
+                     *probe,
+                     reached_,
+                     lost_,
+                     searched_,
+                     short_ones_left_,
+                     std::vector<char>(points_.size(), 0),
                      boxes_};
     for (const auto& [sharpest, t] : sharp) {
         for (const int v : triangles_[t])

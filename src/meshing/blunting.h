@@ -38,6 +38,7 @@ struct BluntedMesh {
     std::set<std::pair<int, int>>&
         lost;                     ///< Edges, ascending, that may come back and are not to be made anew.
     std::vector<char>& searched;  ///< Per triangle: in vain, as it is.
+    long& short_ones_left;        ///< So many moves are still tried for triangles of less than half a detail.
     std::vector<char> touched;    ///< Per vertex: a change is near.
     std::unique_ptr<TriangleBoxes>& boxes;  ///< Made when they are asked for.
 

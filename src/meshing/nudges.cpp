@@ -19,7 +19,7 @@ constexpr double kFirstStep = 0.3, kLastStep = 0.02;  // of the mean edge
 constexpr int kHalvings = 2;                          // of a move that leaves the tolerance
 constexpr double kFitted = 0.01;                      // tolerances: what is that far off may be farther off
 constexpr double kLift = 0.25;                        // tolerances: so far up or down
-constexpr double kShort = 0.5;                        // details: longest edge of what is not worth it
+constexpr double kShort = 0.5;  // details: longest edge of what is looked at only where there is little of it
 
 /// The triangles around a vertex.
 struct Star {
@@ -144,7 +144,8 @@ std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
 }  // namespace
 
 std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness) {
-    if (longest_edge(mesh, triangle) < kShort * mesh.detail) return std::nullopt;
+    if (longest_edge(mesh, triangle) < kShort * mesh.detail && mesh.short_ones_left-- <= 0)
+        return std::nullopt;
     auto& points = mesh.points;
     struct Move {
         int vertex;

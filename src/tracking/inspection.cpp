@@ -22,7 +22,7 @@ constexpr double kMany = 0.3;    // of the triangles: when more change all dista
 constexpr double kAroundChanges = 2.01;                    // cutoffs: and some room for rounding
 constexpr double kFaultReach = 1.5;                        // resolutions
 constexpr double kMissedSpacing = 0.75, kMissedAt = 1.3;   // resolutions, tolerances: no particle is nearer
-constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions: at first, later
+constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions
 constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
 
 struct Corners {
@@ -125,7 +125,7 @@ void Inspector::restart() {
     facets_.clear();
     errors_.reset();
     forget_distances();
-    looks_ = 0;
+    looked_at_topology_ = false;
 }
 
 std::function<void()> Inspector::expect(const std::vector<Vec3>& particles,
@@ -312,24 +312,20 @@ void Inspector::prepare_topology() {
 void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {
     prepare_topology();
     inspection.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, *sides_);
-    doubt(inspection.topology.faults, looks_ == 0 ? kFaultSpacing : kVainSpacing, inspection);
-    if (looks_ <= 1) {
-        std::vector<Vec3> places;
-        for (std::size_t t = 0; t < inspection.topology.speck.size(); ++t) {
-            const auto& [i, j, k] = mesh.carved.triangles[t];
-            if (inspection.topology.speck[t])
-                places.push_back((mesh.vertices[i] + mesh.vertices[j] + mesh.vertices[k]) / 3.0);
-        }
-        doubt(places, kVainSpacing, inspection);
+    if (std::exchange(looked_at_topology_, true)) return;
+    doubt(inspection.topology.faults, kFaultSpacing, inspection);
+    std::vector<Vec3> places;
+    for (std::size_t t = 0; t < inspection.topology.speck.size(); ++t) {
+        const auto& [i, j, k] = mesh.carved.triangles[t];
+        if (inspection.topology.speck[t])
+            places.push_back((mesh.vertices[i] + mesh.vertices[j] + mesh.vertices[k]) / 3.0);
     }
-    if (looks_ == 0) {  // what is not mended then seldom is
-        std::vector<Shortage> at;
-        for (const auto& diagonal : inspection.topology.parted)
-            for (const Vec3& place : diagonal.beside)
-                at.push_back({place, kFaultSpacing * surface_.resolution()});
-        inspection.doubts.push_back({{}, 0.0, std::move(at)});
-    }
-    ++looks_;
+    doubt(places, kVainSpacing, inspection);
+    std::vector<Shortage> at;
+    for (const auto& diagonal : inspection.topology.parted)
+        for (const Vec3& place : diagonal.beside)
+            at.push_back({place, kFaultSpacing * surface_.resolution()});
+    inspection.doubts.push_back({{}, 0.0, std::move(at)});
 }
 
 std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspection, const Tetrahedra& cells,

@@ -37,7 +37,8 @@ struct Inspection {
     double crossings_mean_square = 0.0;  ///< Of the crossings that were found.
     std::size_t lost_crossings = 0;      ///< Of these and those: not found.
     LatticeTopology topology;
-    std::vector<Doubt> doubts;  ///< Near its faults and near what was mended in vain, and all missed between.
+    std::vector<Doubt>
+        doubts;  ///< Near its faults at first, near what was mended in vain, and all missed between.
 };
 
 /// The largest of `errors` (one per triangle) around each of so many particles; negative without a triangle.
@@ -83,7 +84,8 @@ public:
     bool thins_out() const { return crossings_.thinned_out(surface_); }
     /// What looking at the topology needs of the surface alone; done then if not before.
     void prepare_topology();
-    /// The topology of the mesh just inspected.
+    /// The topology of the mesh just inspected. The first time its faults are doubtful places; what more
+    /// particles there do not mend then they seldom do.
     void inspect_topology(const FrameMesh& mesh, Inspection& inspection);
 
 private:
@@ -121,7 +123,7 @@ private:
     bool measured_ = false;                 // and kept up to date from then on
     std::vector<std::vector<int>> missed_;  // of each of distances_, ascending
     std::optional<LatticeSides> sides_;
-    int looks_ = 0;  // at the topology
+    bool looked_at_topology_ = false;
 };
 
 /// Where particles are missing: at the dual crossings of triangles with too large an error, turned from the

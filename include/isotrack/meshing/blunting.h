@@ -36,14 +36,14 @@ public:
 
     /// Looks at the triangles with an angle below 30 degrees, sharpest first, but for those that were looked
     /// at in vain and have not changed since; so often, or until nothing changes. Flips the longest edge, or
-    /// moves a corner that is movable along the surface, unless that edge is shorter than half a detail. Its
-    /// height above it is kept; one of a hundredth of `tolerance` or more may become a quarter of that higher
-    /// or lower where it must. A change is made where the smallest angle of the triangles concerned grows by
-    /// a tenth or more or to 30 degrees, and all of them face the way the surface does (at a corner or the
-    /// centroid), or no worse than before, are within `tolerance` of it, leave nothing that they stood for
-    /// farther from the mesh than that and than it was, and cross no other triangle. Below 18 degrees corners
-    /// may leave the surface, too. Points that move keep no more digits than floats. Returns whether anything
-    /// changed.
+    /// moves a corner that is movable along the surface; where that edge is shorter than half a detail only
+    /// as long as there are few. Its height above it is kept; one of a hundredth of `tolerance` or more may
+    /// become a quarter of that higher or lower where it must. A change is made where the smallest angle of
+    /// the triangles concerned grows by a tenth or more or to 30 degrees, and all of them face the way the
+    /// surface does (at a corner or the centroid), or no worse than before, are within `tolerance` of it,
+    /// leave nothing that they stood for farther from the mesh than that and than it was, and cross no other
+    /// triangle. Below 18 degrees corners may leave the surface, too. Points that move keep no more digits
+    /// than floats. Returns whether anything changed.
     bool run(int passes);
 
     /// Takes back the changes of which a triangle's box is within `distance` of one of these places, and what
@@ -68,6 +68,7 @@ private:
     std::vector<char> open_;       // per vertex: triangles around it are to be looked at
     std::vector<char> unchecked_;  // per triangle: changed since crossings were looked for
     std::vector<char> searched_;   // per triangle: see BluntedMesh
+    long short_ones_left_;         // likewise
     std::vector<Blunting> changes_;
     std::set<std::pair<int, int>> lost_;  // edges that were flipped: taking that back brings them back
     std::unique_ptr<TriangleBoxes> boxes_;
