@@ -1,15 +1,20 @@
 #include "tracking/thinning.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <queue>
-#include <tuple>
+#include <utility>
 
+#include "find_in_blocks.h"
 #include "isotrack/meshing/certify.h"
 #include "meshing/sharpness.h"
 #include "meshing/stands_for.h"
 #include "sampling/metric.h"
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
@@ -67,42 +72,58 @@ public:
              const CrossingGrid& crossings, const ThinningLimits& limits)
         : particles_(particles),
           triangles_(triangles),
-          probe_(surface.probe()),
+          surface_(surface),
           crossings_(crossings),
           limits_(limits),
           around_(particles.size()),
-          keep_(particles.size(), 1) {
+          keep_(particles.size(), 1),
+          gone_(triangles.size(), 0),
+          changed_(particles.size(), 0) {
         for (std::size_t t = 0; t < triangles.size(); ++t)
             for (const int v : triangles[t]) around_[v].push_back(static_cast<int>(t));
     }
 
     std::vector<char> run() {
         using Candidate = std::pair<double, int>;  // squared distance to the nearest, particle
-        std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> queue;
-        const auto push = [&](int i) {
-            if (const double q = nearest_square(i); q < limits_.crowded * limits_.crowded)
-                queue.emplace(q, i);
-        };
-        for (std::size_t i = 0; i < particles_.size(); ++i) push(static_cast<int>(i));
+        std::vector<Candidate> crowded = find_in_blocks<Candidate>(
+            particles_.size(), 1024, [&](std::size_t begin, std::size_t end, std::vector<Candidate>& found) {
+                for (std::size_t i = begin; i < end; ++i)
+                    if (const double q = nearest_square(static_cast<int>(i)); is_crowded(q))
+                        found.emplace_back(q, static_cast<int>(i));
+            });
+        // Most may not go; what nobody has gone beside is known from the start.
+        ThreadProbes probes(surface_);
+        std::vector<std::vector<Triangle>> at_first(crowded.size());
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, crowded.size(), 16), [&](const auto& range) {
+            for (std::size_t k = range.begin(); k < range.end(); ++k)
+                at_first[k] = closing_of(crowded[k].second, probes.local());
+        });
+        std::vector<int> number(particles_.size(), -1);
+        for (std::size_t k = 0; k < crowded.size(); ++k) number[crowded[k].second] = static_cast<int>(k);
+        std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> queue(std::greater<>(),
+                                                                                     std::move(crowded));
         while (!queue.empty()) {
             const auto [q, i] = queue.top();
             queue.pop();
-            if (!keep_[i]) continue;
             const double now = nearest_square(i);
             if (now != q) {  // a neighbour has gone
-                if (now < limits_.crowded * limits_.crowded) queue.emplace(now, i);
+                if (is_crowded(now)) queue.emplace(now, i);
                 continue;
             }
-            take_out(i);
+            const auto closing = changed_[i] ? closing_of(i, probes.local()) : std::move(at_first[number[i]]);
+            if (!closing.empty() && all_keep_a_fan(closing)) take_out(i, closing);
         }
         std::vector<Triangle> rest;
         for (std::size_t t = 0; t < triangles_.size(); ++t)
-            if (t >= gone_.size() || !gone_[t]) rest.push_back(triangles_[t]);
+            if (!gone_[t]) rest.push_back(triangles_[t]);
         triangles_ = std::move(rest);
         return std::move(keep_);
     }
 
 private:
+    bool is_crowded(double nearest_square) const {
+        return nearest_square < limits_.crowded * limits_.crowded;
+    }
     double nearest_square(int i) const {
         const Metric own = metric_of(particles_, static_cast<std::size_t>(i));
         double least = kInfinite;
@@ -147,52 +168,65 @@ private:
         return {at[t[0]], at[t[1]], at[t[2]]};
     }
 
-    void take_out(int i) {
+    /// The triangles that would close the gap of a particle; none when it has to stay.
+    std::vector<Triangle> closing_of(int i, Surface::Probe& probe) const {
         const std::vector<int> ring = ring_around(i);
-        if (ring.size() < 3) return;
+        if (ring.size() < 3) return {};
         const auto& at = particles_.position;
-        const std::vector<Triangle> closing = triangles_within(ring, at[i], at);
-        if (closing.empty()) return;
+        std::vector<Triangle> closing = triangles_within(ring, at[i], at);
         double sharpest = kSharpnessAt30Degrees;
         for (const int t : around_[i]) sharpest = std::max(sharpest, sharpness_of(triangles_[t]));
         const auto passes = [&](const Triangle& t) {
             if (!(sharpness_of(t) <= sharpest)) return false;
-            for (const int v : t)  // two triangles back to back
-                if (around_[v].size() <= 3) return false;
             const TriangleError error =
-                certified_error(at[t[0]], at[t[1]], at[t[2]], *probe_, limits_.detail, limits_.error);
+                certified_error(at[t[0]], at[t[1]], at[t[2]], probe, limits_.detail, limits_.error);
             return error.largest <= limits_.error && error.turned_deg <= kMostTurnedDeg;
         };
-        if (!std::all_of(closing.begin(), closing.end(), passes)) return;
+        if (closing.empty() || !std::all_of(closing.begin(), closing.end(), passes)) return {};
         std::vector<FacingTriangle> before, after;
         Box box(at[i]);
         for (const int v : ring) box.extend(at[v]);
         for (const int t : around_[i]) before.push_back(facing_triangle(triangles_[t]));
         for (const Triangle& t : closing) after.push_back(facing_triangle(t));
-        if (!stand_for_same(crossings_, before, box, after, {}, limits_.reach)) return;
+        if (!stand_for_same(crossings_, before, box, after, {}, limits_.reach)) closing.clear();
+        return closing;
+    }
+
+    /// Two triangles are none: they would lie back to back. Changes farther off than the ring of one decide.
+    bool all_keep_a_fan(const std::vector<Triangle>& closing) const {
+        return std::all_of(closing.begin(), closing.end(), [&](const Triangle& t) {
+            return std::all_of(t.begin(), t.end(), [&](int v) { return around_[v].size() > 3; });
+        });
+    }
+
+    void take_out(int i, const std::vector<Triangle>& closing) {
         keep_[i] = 0;
-        gone_.resize(triangles_.size(), 0);
-        for (const int t : around_[i]) gone_[t] = 1;
-        for (const int v : ring) {
-            auto& own = around_[v];
-            own.erase(std::remove_if(own.begin(), own.end(), [&](int t) { return gone_[t] != 0; }),
-                      own.end());
+        std::vector<int> fan;
+        fan.swap(around_[i]);
+        for (const int t : fan) {
+            gone_[t] = 1;
+            for (const int v : triangles_[t]) {
+                auto& own = around_[v];
+                own.erase(std::remove(own.begin(), own.end(), t), own.end());
+                changed_[v] = 1;
+            }
         }
-        around_[i].clear();
         for (const Triangle& t : closing) {
             for (const int v : t) around_[v].push_back(static_cast<int>(triangles_.size()));
             triangles_.push_back(t);
+            gone_.push_back(0);
         }
-        gone_.resize(triangles_.size(), 0);
     }
 
     const Particles& particles_;
     std::vector<Triangle>& triangles_;
-    std::unique_ptr<Surface::Probe> probe_;
+    const Surface& surface_;
     const CrossingGrid& crossings_;
     const ThinningLimits limits_;
     std::vector<std::vector<int>> around_;  // triangles of each particle
-    std::vector<char> keep_, gone_;         // particles, triangles
+    std::vector<char> keep_;                // particles
+    std::vector<char> gone_;                // triangles
+    std::vector<char> changed_;             // particles: beside one that has gone
 };
 
 }  // namespace
