@@ -103,7 +103,7 @@ Adjacency Adjacency::extended(const std::vector<std::array<int, 3>>& newborn, st
     });
 }
 
-Adjacency Adjacency::squared() const {
+Adjacency Adjacency::squared(const std::vector<char>& some) const {
     constexpr std::size_t kBlock = 1024;
     Adjacency result;
     result.first.resize(size() + 1);
@@ -112,6 +112,7 @@ Adjacency Adjacency::squared() const {
     const auto find = [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
         std::vector<int>& listed = listed_by.local();
         for (std::size_t i = begin; i < end; ++i) {
+            if (!some.empty() && !some[i]) continue;
             const std::size_t start = found.size();
             const int self = static_cast<int>(i);
             listed[i] = self;

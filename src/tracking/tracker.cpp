@@ -343,8 +343,8 @@ void Tracker::Impl::follow(const Surface& surface, const CrossingGrid& crossings
     keep.resize(particles.size(), 1);
     particles.retain(keep);
     last_mesh.retain(keep);
-    frame.sweeps += relax(particles, last_mesh.ring.squared(), surface, pace.sweeps,
-                          warm ? restless(l.detail) : std::vector<char>());
+    const std::vector<char> moving = warm ? restless(l.detail) : std::vector<char>();
+    frame.sweeps += relax(particles, last_mesh.ring.squared(moving), surface, pace.sweeps, moving);
 }
 
 /// Those around triangles that are too sharp, the newborn, and those next to them.

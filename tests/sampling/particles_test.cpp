@@ -43,6 +43,9 @@ TEST(Adjacency, RingSquareGapsAndNewborn) {
     EXPECT_TRUE(list(ring, 5).empty());
     EXPECT_EQ(list(ring.squared(), 0), (std::vector<int>{1, 2, 3, 4}));
     EXPECT_EQ(list(ring.squared(), 4), (std::vector<int>{0, 1, 2, 3}));
+    const Adjacency of_one = ring.squared({0, 0, 0, 0, 1});
+    EXPECT_EQ(list(of_one, 4), (std::vector<int>{0, 1, 2, 3}));
+    EXPECT_EQ(of_one.of(0).size(), 0u);
     // Without 2 its neighbours 0 1 3 4 know each other; they are numbered 0 1 2 3 now.
     const Adjacency gap = ring.restricted({1, 1, 0, 1, 1, 1});
     ASSERT_EQ(gap.size(), 5u);

@@ -28,8 +28,9 @@ struct Adjacency {
     /// Of `count` particles: `newborn` k, neighbour of three others, is number `size() + k`; the rest have no
     /// neighbours yet.
     Adjacency extended(const std::vector<std::array<int, 3>>& newborn, std::size_t count) const;
-    /// Neighbours and their neighbours.
-    Adjacency squared() const;
+    /// Neighbours and their neighbours: of those whose flag is set, or of all if there are no flags; the others
+    /// have none then.
+    Adjacency squared(const std::vector<char>& some = {}) const;
 };
 
 /// Of `count` particles, from directed pairs, which may repeat.
