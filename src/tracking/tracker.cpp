@@ -352,11 +352,13 @@ std::vector<char> Tracker::Impl::restless(double detail) const {
     std::vector<char> result(particles.size());
     const auto is_new = [&](int i) { return particles.id[i] >= first_of_frame; };
     for (std::size_t i = 0; i < particles.size(); ++i) result[i] = is_new(static_cast<int>(i));
-    const auto& at = particles.position;
+    const auto is_sharp = [&](const Triangle& t, double sharpness) {
+        const auto& at = particles.position;
+        return is_sharper(sharpness, at[t[0]], at[t[1]], at[t[2]]);
+    };
     for (const Triangle& t : last_mesh.triangles)
-        if (std::any_of(t.begin(), t.end(), is_new) ||
-            (is_sharper(kSharpnessAt31Degrees, at[t[0]], at[t[1]], at[t[2]]) &&
-             angles_matter(particles, t, detail)))
+        if (std::any_of(t.begin(), t.end(), is_new) || is_sharp(t, kSharpnessAt22Degrees) ||
+            (is_sharp(t, kSharpnessAt31Degrees) && angles_matter(particles, t, detail)))
             for (const int i : t) result[i] = 1;
     return result;
 }
