@@ -129,46 +129,54 @@ Pull pull_of(const Piece& piece, const Particles& particles, double robust, Surf
     return pull;
 }
 
-/// The linear equations for all pieces together: their pulls, and what holds those beside each other.
+using SparseMatrix = Eigen::SparseMatrix<double>;
+using Solver = Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower>;
+
+/// The linear equations for a turn and a shift of each piece: their pulls, and what holds those beside each
+/// other. Of the matrix, which is symmetric, there is the lower half.
 class Equations {
 public:
     explicit Equations(std::size_t pieces)
         : unknowns_(static_cast<Eigen::Index>(6 * pieces)), right_(Eigen::VectorXd::Zero(unknowns_)) {}
 
     void add(const std::vector<Piece>& pieces, std::size_t k, const Pull& pull, double resolution) {
+        using Row = Eigen::Matrix<double, 6, 3>;
         const Piece& piece = pieces[k];
-        constexpr double kWeight = static_cast<double>(kSamples);
+        const auto first = static_cast<Eigen::Index>(6 * k);
+        constexpr double kWeight = static_cast<double>(kSamples), kHold = kStiffness * kWeight;
         double size2 = resolution * resolution;
+        Mat6 own = pull.squares;
+        right_.segment<6>(first) += pull.products;
         for (const int l : piece.beside) {
             // Where this piece would take the middle of the one beside it, less where that takes it.
             const Piece& other = pieces[l];
             const Vec3 arm = piece.turn * (other.middle - piece.middle),
                        apart = piece.moved(other.middle) - (other.middle + other.shift);
-            Eigen::Matrix<double, 3, 6> here, there;
-            here << -cross_matrix(arm), Mat3::Identity();
-            there << Mat3::Zero(), -Mat3::Identity();
-            const double stiffness = kStiffness * kWeight;
-            const Mat6 across = stiffness * here.transpose() * there;
-            add_block(k, k, stiffness * here.transpose() * here);
-            add_block(k, l, across);
-            add_block(l, k, across.transpose());
-            add_block(l, l, stiffness * there.transpose() * there);
-            right_.segment<6>(static_cast<Eigen::Index>(6 * k)) -= stiffness * here.transpose() * apart;
-            right_.segment<6>(6 * l) -= stiffness * there.transpose() * apart;
+            Row here;
+            here << cross_matrix(arm), Mat3::Identity();
+            const Eigen::Index shift = 6 * l + 3;
+            own += kHold * here * here.transpose();
+            if (l < static_cast<int>(k))
+                add_block(first, shift, -kHold * here);
+            else
+                add_block(shift, first, -kHold * here.transpose());
+            for (int axis = 0; axis < 3; ++axis) add_entry(shift + axis, shift + axis, kHold);
+            right_.segment<6>(first) -= kHold * here * apart;
+            right_.segment<3>(shift) += kHold * apart;
             size2 = std::max(size2, arm.squaredNorm());
         }
-        Mat6 own = pull.squares;
         own.diagonal().head<3>().array() += kDamping * kWeight * size2;
         own.diagonal().tail<3>().array() += kDamping * kWeight;
-        add_block(k, k, own);
-        right_.segment<6>(static_cast<Eigen::Index>(6 * k)) += pull.products;
+        for (int a = 0; a < 6; ++a)
+            for (int b = 0; b <= a; ++b) add_entry(first + a, first + b, own(a, b));
     }
 
-    /// A turn and a shift for each piece; nothing where there is no answer.
-    Eigen::VectorXd solve() const {
-        Eigen::SparseMatrix<double> matrix(unknowns_, unknowns_);
+    /// Nothing where there is no answer. `solver`: that of equations for the same pieces, or a new one.
+    Eigen::VectorXd solve(Solver& solver) const {
+        SparseMatrix matrix(unknowns_, unknowns_);
         matrix.setFromTriplets(entries_.begin(), entries_.end());
-        const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(matrix);
+        if (solver.rows() != unknowns_) solver.analyzePattern(matrix);
+        solver.factorize(matrix);
         if (solver.info() != Eigen::Success) return {};
         Eigen::VectorXd solution = solver.solve(right_);
         if (!solution.allFinite()) solution.resize(0);
@@ -176,12 +184,13 @@ public:
     }
 
 private:
-    template <typename Row, typename Column>
-    void add_block(Row row, Column column, const Mat6& block) {
-        for (int a = 0; a < 6; ++a)
-            for (int b = 0; b < 6; ++b)
-                entries_.emplace_back(6 * static_cast<int>(row) + a, 6 * static_cast<int>(column) + b,
-                                      block(a, b));
+    void add_entry(Eigen::Index row, Eigen::Index column, double value) {
+        entries_.emplace_back(static_cast<int>(row), static_cast<int>(column), value);
+    }
+    template <typename Block>
+    void add_block(Eigen::Index row, Eigen::Index column, const Block& block) {
+        for (Eigen::Index a = 0; a < block.rows(); ++a)
+            for (Eigen::Index b = 0; b < block.cols(); ++b) add_entry(row + a, column + b, block(a, b));
     }
 
     Eigen::Index unknowns_;
@@ -226,6 +235,7 @@ std::optional<std::vector<Vec3>> register_to(const Surface& surface, const Parti
     for (Piece& piece : pieces) move_as(particles.position, guess, piece);
     ThreadProbes probes(surface);
     std::vector<Pull> pulls(pieces.size());
+    Solver solver;
     double robust = 2.0 * resolution, off_before = std::numeric_limits<double>::infinity();
     for (int step = 0; step < kMostSteps; ++step) {
         parallel_for_each(pieces.size(), 4, [&](std::size_t k) {
@@ -245,7 +255,7 @@ std::optional<std::vector<Vec3>> register_to(const Surface& surface, const Parti
         robust = std::max(resolution, 2.0 * off);
         Equations equations(pieces.size());
         for (std::size_t k = 0; k < pieces.size(); ++k) equations.add(pieces, k, pulls[k], resolution);
-        const Eigen::VectorXd solution = equations.solve();
+        const Eigen::VectorXd solution = equations.solve(solver);
         if (solution.size() == 0) break;
         for (std::size_t k = 0; k < pieces.size(); ++k) {
             const Vec6 own = solution.segment<6>(static_cast<Eigen::Index>(6 * k));

@@ -45,7 +45,7 @@ constexpr int kRounds = 2, kDenseRounds = 3;
 constexpr int kMendingSweeps = 3;
 constexpr int kMostMendings = 1;
 constexpr double kAstray = 0.125;  // of the particles: so many newborn at the end of the arrays are too many
-constexpr double kFew = 0.02;      // of the particles: few enough to be added by certify, without relaxation
+constexpr double kFew = 0.03;      // of the particles: few enough to be added by certify, without relaxation
 /// How fast the population goes after the wanted spacing.
 struct Pace {
     PopulationBand band;
