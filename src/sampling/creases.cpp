@@ -3,19 +3,25 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <vector>
 
+#include "parallel_for_each.h"
+#include "surface/thread_probes.h"
 #include "ways_around.h"
 
 namespace isotrack {
 namespace {
 
-constexpr double kTurn = 0.94;        // cosine between neighbours' normals: less may be a crease
-constexpr double kNeighbourly = 2.0;  // spacings
-constexpr double kReach = 0.4;        // of the spacing
-constexpr double kRoom = 0.8;         // of the spacing: nobody that near to where it goes
-constexpr double kStill = 0.02;       // of the spacing: one that moves less is there already
-constexpr double kLine = 0.03;        // second eigenvalue: a crease of 20 degrees through the middle
-constexpr double kCorner = 0.15;  // third: that of a cube has 0.2, a ball of two resolutions less than 0.1
+constexpr double kTurn = 0.94;                  // cosine between neighbours' normals: less may be a crease
+constexpr double kNeighbourly = 2.0;            // spacings
+constexpr double kReach = 0.4;                  // of the spacing
+constexpr double kRoom = 0.8;                   // of the spacing: nobody that near to where it goes
+constexpr double kStill = 0.02;                 // of the spacing: one that moves less is there already
+constexpr double kSlid = 0.1, kStayed = 0.002;  // of the spacing: how far somebody has slid off a crease
+constexpr double kLine = 0.03;       // second eigenvalue: a crease of 20 degrees through the middle
+constexpr double kSharpLine = 0.12;  // likewise, of 45 degrees
+constexpr double kCorner = 0.15;     // third: that of a cube has 0.2, a ball of two resolutions less than 0.1
 
 bool may_be_near_crease(const Particles& particles, Adjacency::Range neighbours, int i) {
     const double near = kNeighbourly * particles.spacing[i];
@@ -33,13 +39,19 @@ bool is_taken(const Particles& particles, Adjacency::Range neighbours, const Vec
     });
 }
 
-}  // namespace
+/// A place on a crease or in a corner.
+struct Place {
+    Vec3 position, normal;
+    Crease crease;
+};
 
-Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, double resolution,
-                      Surface::Probe& probe) {
-    if (!may_be_near_crease(particles, neighbours, i)) return {};
+/// That within `reach` of particle i, if there is one: where the second eigenvalue is no less than
+/// `least_line`.
+std::optional<Place> place_near(const Particles& particles, Adjacency::Range neighbours, int i, double reach,
+                                double least_line, double resolution, Surface::Probe& probe) {
+    if (!may_be_near_crease(particles, neighbours, i)) return std::nullopt;
     const Vec3 p = particles.position[i], n = particles.normal[i];
-    const double reach = kReach * particles.spacing[i], around = std::max(reach, resolution);
+    const double around = std::max(reach, resolution);
     const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
     Mat3 normals = n * n.transpose();  // of the normal equations, for moves from p, as is the pull
     Vec3 pull = Vec3::Zero();
@@ -48,17 +60,17 @@ Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, 
         const Vec3 to = around * (cosine * a + sine * b);
         const Surface::Sample f = probe.sample(p + to);
         const double slope = f.gradient.norm();
-        if (!(slope > 0.0)) return {};
+        if (!(slope > 0.0)) return std::nullopt;
         const Vec3 m = f.gradient / slope;
         normals += m * m.transpose();
         pull += (m.dot(to) - f.value / slope) * m;
         turned += 1.0 - m.dot(n) * m.dot(n);
     }
     const auto planes = static_cast<double>(ways_around().size() + 1);
-    if (!(turned > planes * kLine)) return {};
+    if (!(turned > planes * least_line)) return std::nullopt;
     const Eigen::SelfAdjointEigenSolver<Mat3> spread(normals / planes);
     const Vec3& values = spread.eigenvalues();  // ascending
-    if (!(values[1] > kLine)) return {};
+    if (!(values[1] > least_line)) return std::nullopt;
     const bool is_corner = values[0] > kCorner;
     Vec3 move = Vec3::Zero();
     for (int k = is_corner ? 0 : 1; k < 3; ++k) {
@@ -66,16 +78,43 @@ Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, 
         move += axis.dot(pull) / (planes * values[k]) * axis;
     }
     const auto is_within = [&](const Vec3& x) { return x.squaredNorm() < reach * reach; };
-    if (!is_within(move)) return {};
+    if (!is_within(move)) return std::nullopt;
     const auto q = probe.project(p + move);
-    if (!q || !is_within(*q - p)) return {};
+    if (!q || !is_within(*q - p)) return std::nullopt;
     const Vec3 normal = probe.normal(*q);
-    if (!(normal.dot(n) > 0.0)) return {};
-    const bool stays = (*q - p).norm() < kStill * particles.spacing[i];
-    if (!stays && is_taken(particles, neighbours, *q, normal, kRoom * particles.spacing[i])) return {};
-    particles.position[i] = *q;
-    particles.normal[i] = normal;
-    return {is_corner ? Crease::Kind::Corner : Crease::Kind::Line, spread.eigenvectors().col(0)};
+    if (!(normal.dot(n) > 0.0)) return std::nullopt;
+    return Place{
+        *q, normal, {is_corner ? Crease::Kind::Corner : Crease::Kind::Line, spread.eigenvectors().col(0)}};
+}
+
+}  // namespace
+
+Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, double resolution,
+                      Surface::Probe& probe) {
+    const double h = particles.spacing[i];
+    const auto place = place_near(particles, neighbours, i, kReach * h, kLine, resolution, probe);
+    if (!place) return {};
+    const bool stays = (place->position - particles.position[i]).norm() < kStill * h;
+    if (!stays && is_taken(particles, neighbours, place->position, place->normal, kRoom * h)) return {};
+    particles.position[i] = place->position;
+    particles.normal[i] = place->normal;
+    return place->crease;
+}
+
+void return_to_creases(Particles& particles, const Adjacency& adjacency, const Surface& surface) {
+    ThreadProbes probes(surface);
+    std::vector<std::optional<Place>> places(particles.size());
+    parallel_for_each(particles.size(), 64, [&](std::size_t i) {
+        places[i] = place_near(particles, adjacency.of(i), static_cast<int>(i), kSlid * particles.spacing[i],
+                               kSharpLine, surface.resolution(), probes.local());
+    });
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+        if (!places[i] ||
+            (places[i]->position - particles.position[i]).norm() < kStayed * particles.spacing[i])
+            continue;
+        particles.position[i] = places[i]->position;
+        particles.normal[i] = places[i]->normal;
+    }
 }
 
 }  // namespace isotrack

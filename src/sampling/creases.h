@@ -25,4 +25,8 @@ struct Crease {
 Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, double resolution,
                       Surface::Probe& probe);
 
+/// Brings everybody back to the crease or corner that is within a tenth of the spacing, as after a motion
+/// that was not quite right; those that are on it stay.
+void return_to_creases(Particles& particles, const Adjacency& adjacency, const Surface& surface);
+
 }  // namespace isotrack

@@ -21,6 +21,7 @@
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
 #include "meshing/sharpness.h"
+#include "sampling/creases.h"
 #include "surface/float_precision.h"
 #include "tracking/carry.h"
 #include "tracking/failing.h"
@@ -56,7 +57,7 @@ constexpr Pace kAtFirst{{}, 0.3, 5}, kDenseAtFirst{{}, 0.3, 7};
 // What the mesh can do without goes sooner; where it is too coarse certify finds better places.
 constexpr Pace kFollowing{{0.7, 1.1}, 0.3, 3};
 constexpr double kThinned = 0.85;      // of the tolerance: error of triangles that close the gap of a death
-constexpr double kUnfitted = 1.6;      // times what a fit leaves of an error
+constexpr double kUnfitted = 1.3;      // times what a fit leaves of an error
 constexpr int kMostLayers = 4;         // of newborn around those that move
 constexpr double kFewWithError = 0.9;  // of the particles: smooth surfaces have more
 constexpr double kMostSeeded = 0.05;   // of the particles; with more the next frame is half a cold start
@@ -330,6 +331,7 @@ void Tracker::Impl::follow(const Surface& surface, const CrossingGrid& crossings
     const StageTimer timer(frame.seconds, "relax");
     std::vector<char> keep;
     if (warm) {
+        return_to_creases(particles, last_mesh.ring, surface);
         const double enough = (options.fit ? kUnfitted : 1.0) * l.tolerance;
         keep = thin(particles, last_mesh.triangles, surface, crossings,
                     {pace.band.crowded, kThinned * enough, kCertified * enough, l.detail});

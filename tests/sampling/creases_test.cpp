@@ -7,8 +7,10 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
+#include "isotrack/sampling/cover.h"
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/surface/shapes.h"
 #include "support/particles.h"
@@ -53,6 +55,39 @@ TEST(PullToCrease, PutsIntoTheCornerWhatIsWithinReach) {
     const Pulled result = pulled(*box, {1, 0.98, 0.97}, {{0.9, 1, 0.9}, {0.9, 0.9, 1}});
     EXPECT_EQ(result.crease.kind, Crease::Kind::Corner);
     EXPECT_LT((result.position - Vec3(1, 1, 1)).norm(), 1e-4);
+}
+
+TEST(ReturnToCreases, BringsBackWhoHasSlidOffALittle) {
+    const auto box = shapes::box({0, 0, 0}, {1, 1, 1}, kResolution);
+    const auto probe = box->probe();
+    // On an edge, slid off it, in a corner, slid off it, on a face too far from any; and some beside them.
+    const std::vector<Vec3> places{{1, 1, 0.3},     {1, 0.985, -0.1}, {1, 1, 1},        {0.995, 1, -0.995},
+                                   {1, 0.94, -0.5}, {0.9, 1, 0.1},    {0.85, 0.9, 1.0}, {1, 0.9, -0.9}};
+    Particles particles;
+    for (const Vec3& p : places) {
+        const Vec3 n = p.z() == 1.0 && p.x() < 1.0 ? Vec3(0, 0, 1) : probe->normal(p - 1e-3 * p);
+        particles.add(p, n, kSpacing, static_cast<Id>(particles.size()));
+    }
+    particles.normal[0] = Vec3(1, 0, 0);
+    particles.normal[2] = Vec3(1, 0, 0);
+    std::vector<std::pair<int, int>> pairs;
+    for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 8; ++j)
+            if (i != j) pairs.emplace_back(i, j);
+    return_to_creases(particles, from_pairs(pairs, places.size()), *box);
+    const Vec3 wanted[] = {{1, 1, 0.3}, {1, 1, -0.1}, {1, 1, 1}, {1, 1, -1}, {1, 0.94, -0.5}};
+    for (int i = 0; i < 5; ++i)
+        EXPECT_LT((particles.position[i] - wanted[i]).norm(), 1e-4) << particles.position[i].transpose();
+}
+
+TEST(ReturnToCreases, LeavesWhatIsSmoothWhereItIs) {
+    const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.3, kResolution);
+    Particles particles;
+    Id next_id = 0;
+    cover(particles, *torus, CrossingGrid(*torus), support::limits_of(kSpacing), 1, next_id);
+    const Particles before = particles;
+    return_to_creases(particles, adjacency_of(particles), *torus);
+    EXPECT_EQ(particles.position, before.position);
 }
 
 TEST(PullToCrease, LeavesAloneWhereAnotherIsOrNobodyFacesAnotherWay) {
