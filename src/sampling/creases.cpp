@@ -45,13 +45,12 @@ struct Place {
     Crease crease;
 };
 
-/// That within `reach` of particle i, if there is one: where the second eigenvalue is no less than
-/// `least_line`.
+/// That within `reach` of particle i, if there is one, by the planes so far `around` it: where the second
+/// eigenvalue is no less than `least_line`.
 std::optional<Place> place_near(const Particles& particles, Adjacency::Range neighbours, int i, double reach,
-                                double least_line, double resolution, Surface::Probe& probe) {
+                                double around, double least_line, Surface::Probe& probe) {
     if (!may_be_near_crease(particles, neighbours, i)) return std::nullopt;
     const Vec3 p = particles.position[i], n = particles.normal[i];
-    const double around = std::max(reach, resolution);
     const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
     Mat3 normals = n * n.transpose();  // of the normal equations, for moves from p, as is the pull
     Vec3 pull = Vec3::Zero();
@@ -92,7 +91,8 @@ std::optional<Place> place_near(const Particles& particles, Adjacency::Range nei
 Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, double resolution,
                       Surface::Probe& probe) {
     const double h = particles.spacing[i];
-    const auto place = place_near(particles, neighbours, i, kReach * h, kLine, resolution, probe);
+    const auto place =
+        place_near(particles, neighbours, i, kReach * h, std::max(kReach * h, resolution), kLine, probe);
     if (!place) return {};
     const bool stays = (place->position - particles.position[i]).norm() < kStill * h;
     if (!stays && is_taken(particles, neighbours, place->position, place->normal, kRoom * h)) return {};
@@ -105,8 +105,9 @@ void return_to_creases(Particles& particles, const Adjacency& adjacency, const S
     ThreadProbes probes(surface);
     std::vector<std::optional<Place>> places(particles.size());
     parallel_for_each(particles.size(), 64, [&](std::size_t i) {
-        places[i] = place_near(particles, adjacency.of(i), static_cast<int>(i), kSlid * particles.spacing[i],
-                               kSharpLine, surface.resolution(), probes.local());
+        const double h = particles.spacing[i], around = std::max(2.0 * kSlid * h, surface.resolution());
+        places[i] = place_near(particles, adjacency.of(i), static_cast<int>(i), kSlid * h, around, kSharpLine,
+                               probes.local());
     });
     for (std::size_t i = 0; i < particles.size(); ++i) {
         if (!places[i] ||

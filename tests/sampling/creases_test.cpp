@@ -61,8 +61,8 @@ TEST(ReturnToCreases, BringsBackWhoHasSlidOffALittle) {
     const auto box = shapes::box({0, 0, 0}, {1, 1, 1}, kResolution);
     const auto probe = box->probe();
     // On an edge, slid off it, in a corner, slid off it, on a face too far from any; and some beside them.
-    const std::vector<Vec3> places{{1, 1, 0.3},     {1, 0.985, -0.1}, {1, 1, 1},        {0.995, 1, -0.995},
-                                   {1, 0.94, -0.5}, {0.9, 1, 0.1},    {0.85, 0.9, 1.0}, {1, 0.9, -0.9}};
+    const std::vector<Vec3> places{{1, 1, 0.3},     {1, 0.985, -0.1}, {1, 1, 1},        {1, 0.995, -0.995},
+                                   {1, 0.94, -0.5}, {0.9, 1, 0.1},    {0.85, 0.9, 1.0}, {0.9, 1, -0.9}};
     Particles particles;
     for (const Vec3& p : places) {
         const Vec3 n = p.z() == 1.0 && p.x() < 1.0 ? Vec3(0, 0, 1) : probe->normal(p - 1e-3 * p);
