@@ -184,7 +184,7 @@ void Blunter::undo(const std::vector<char>& marked) {
         const Blunting& change = changes_[c];
         for (std::size_t i = 0; i < change.triangle.size(); ++i) {
             triangles_[change.triangle[i]] = change.before[i];
-            searched_[changes_[c].triangle[i]] = 0;
+            searched_[change.triangle[i]] = 0;
             unchecked_[change.triangle[i]] = 1;
         }
         for (const Triangle& t : change.before)

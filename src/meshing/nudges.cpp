@@ -186,8 +186,11 @@ std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness)
         }
     }
     if (!(sharpness > kSharpnessAt18Degrees) || mesh.searched[triangle]) return std::nullopt;
+    const Triangle& corners = mesh.triangles[triangle];
+    const bool is_free =
+        std::none_of(corners.begin(), corners.end(), [&](int v) { return mesh.touched[v] != 0; });
     auto found = search(mesh, triangle);
-    mesh.searched[triangle] = !found;
+    mesh.searched[triangle] = !found && is_free;
     return found;
 }
 

@@ -17,6 +17,7 @@ constexpr double kTurn = 0.94;                  // cosine between neighbours' no
 constexpr double kNeighbourly = 2.0;            // spacings
 constexpr double kReach = 0.4;                  // of the spacing
 constexpr double kRoom = 0.8;                   // of the spacing: nobody that near to where it goes
+constexpr double kRoomBack = 0.3;               // likewise, for who comes back
 constexpr double kStill = 0.02;                 // of the spacing: one that moves less is there already
 constexpr double kSlid = 0.1, kStayed = 0.002;  // of the spacing: how far somebody has slid off a crease
 constexpr double kLine = 0.03;       // second eigenvalue: a crease of 20 degrees through the middle
@@ -110,11 +111,14 @@ void return_to_creases(Particles& particles, const Adjacency& adjacency, const S
                                probes.local());
     });
     for (std::size_t i = 0; i < particles.size(); ++i) {
-        if (!places[i] ||
-            (places[i]->position - particles.position[i]).norm() < kStayed * particles.spacing[i])
+        if (!places[i]) continue;
+        const auto& [position, normal, crease] = *places[i];
+        const double h = particles.spacing[i];
+        const Vec3 way = position - particles.position[i];
+        if (way.norm() < kStayed * h || is_taken(particles, adjacency.of(i), position, normal, kRoomBack * h))
             continue;
-        particles.position[i] = places[i]->position;
-        particles.normal[i] = places[i]->normal;
+        particles.position[i] = position;
+        particles.normal[i] = normal;
     }
 }
 

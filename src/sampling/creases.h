@@ -26,7 +26,8 @@ Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, 
                       Surface::Probe& probe);
 
 /// Brings everybody back to the crease or corner that is within a tenth of the spacing, as after a motion
-/// that was not quite right; those that are on it stay.
+/// that was not quite right; those that are on it stay, and whoever would come within 0.3 of the
+/// spacing of a neighbour.
 void return_to_creases(Particles& particles, const Adjacency& adjacency, const Surface& surface);
 
 }  // namespace isotrack

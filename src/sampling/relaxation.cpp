@@ -25,16 +25,15 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
     metrics.reserve(particles.size());
     for (std::size_t i = 0; i < particles.size(); ++i) metrics.push_back(metric_of(particles, i));
     std::vector<double> lambda(particles.size(), 0.1);
-    std::vector<char> moved(particles.size(), 1), met(particles.size(), 0);
+    std::vector<char> moved(particles.size(), 1);
     std::vector<char> active = restless;
     if (active.empty()) active.assign(particles.size(), 1);
     std::vector<Crease> crease(particles.size());
     int done = 0;
     const auto step = [&](int i, Surface::Probe& probe) {
-        // Who is on a crease in its first sweep is brought back to it in the next ones.
-        if (!met[i] || crease[i].kind != Crease::Kind::None)
+        // Who is on a crease in the first sweep is brought back to it in the next ones.
+        if (done == 0 || crease[i].kind != Crease::Kind::None)
             crease[i] = pull_to_crease(particles, adjacency.of(i), i, surface.resolution(), probe);
-        met[i] = 1;
         if (crease[i].kind == Crease::Kind::Corner) return false;
         const Vec3* along = crease[i].kind == Crease::Kind::Line ? &crease[i].along : nullptr;
         return descend(particles, metrics, adjacency.of(i), i, lambda[i], probe, along).moved >

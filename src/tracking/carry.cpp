@@ -15,8 +15,10 @@ namespace isotrack {
 namespace {
 
 constexpr std::size_t kVoters = 2000;
-constexpr double kClearly = 0.8;   // times the distance of the best guess before
-constexpr double kArrived = 0.25;  // resolutions off the surface
+constexpr double kClearly = 0.8;  // times the distance of the best guess before
+// Resolutions off the surface: where a field is believed, where somebody rests unless found to move by so
+// much.
+constexpr double kArrived = 0.25, kRests = 1e-3, kStill = 0.05;
 
 /// The median distance from the surface of so many places.
 double median_off(const std::vector<Vec3>& places, const Surface& surface) {
@@ -44,23 +46,31 @@ std::vector<Vec3> expected_positions(const Particles& particles, const Adjacency
     };
     if (motion) {
         std::vector<Vec3> guess(n);
-        parallel_for_each(n, 256, [&](std::size_t i) { guess[i] = motion(particles.position[i]); });
+        parallel_for_each(n, 256, [&](std::size_t i) {
+            guess[i] = motion(particles.position[i]);
+            if (!guess[i].allFinite()) guess[i] = particles.position[i];
+        });
         take(std::move(guess), 1.0);
     }
     std::vector<Vec3> guess(n);
     for (std::size_t i = 0; i < n; ++i) guess[i] = particles.position[i] + particles.velocity[i];
     const bool goes_on = take(std::move(guess), kClearly), stands = take(particles.position, kClearly);
-    auto registered = register_to(surface, particles, ring, winner);
+    const auto registered = register_to(surface, particles, ring, winner);
     if (!registered) return winner;
-    if (goes_on || stands) {
-        take(std::move(*registered), 1.0);
-        return winner;
-    }
-    // A field knows better where it knows anything: it may be given in a band alone.
+    // A field knows better where it knows anything: it may be given in a band alone. What rests elsewhere
+    // than a motion that was found says may only be its rounding.
     ThreadProbes probes(surface);
+    const bool told = !goes_on && !stands;
     parallel_for_each(n, 256, [&](std::size_t i) {
-        const double off = std::abs(probes.local().value(winner[i]));
-        if (!(off < kArrived * surface.resolution())) winner[i] = (*registered)[i];
+        const auto is_on = [&](const Vec3& p, double within) {
+            return std::abs(probes.local().value(p)) < within * surface.resolution();
+        };
+        const Vec3 &old = particles.position[i], &found = (*registered)[i];
+        if (told ? is_on(winner[i], kArrived)
+                 : is_on(old, kRests) && (found - old).norm() < kStill * surface.resolution())
+            winner[i] = told ? winner[i] : old;
+        else
+            winner[i] = found;
     });
     return winner;
 }

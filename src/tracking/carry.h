@@ -17,7 +17,8 @@ namespace isotrack {
 /// where the particles go compete: `motion` if there is one, the last displacement, standing still. The one
 /// that lands nearest to the surface wins, by its median over the particles; an earlier one wins unless a
 /// later one is clearly better. From there what is next to each other along `ring` moves as rigidly together
-/// as it can, see `register_to`: everywhere, or, when `motion` has won, where that misses the surface.
+/// as it can, see `register_to`; when `motion` has won, where that misses the surface. What is on the surface
+/// and would hardly move stays.
 std::vector<char> carry(Particles& particles, const Adjacency& ring, const Surface& surface,
                         const Tracker::Motion& motion);
 

@@ -17,15 +17,17 @@ using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr std::size_t kPieceSize = 48,
-                      kMostPieces = 160;  // more of the latter where there are more components
-constexpr std::size_t kSamples = 24;      // of a piece
+                      kMostPieces = 160;  // about; more of them where there are more components
+constexpr std::size_t kSamples = 24;      // of a piece, at most
 constexpr int kMostSteps = 8;
-constexpr double kArrived = 0.01;    // resolutions off the surface, root mean square
-constexpr double kBetter = 0.98;     // times that of the step before
-constexpr double kStiffness = 0.2;   // of a pair of pieces, over the weight of the samples of one
-constexpr double kDamping = 1e-5;    // of a piece's motion, likewise
-constexpr double kSpread = 1e-6;     // across a piece over along it: less is a line, whose turn is not known
-constexpr double kLeastSlope = 0.3;  // of the gradient: less is the edge of the band, or between two sheets
+constexpr double kArrived = 0.01;   // resolutions off the surface, root mean square
+constexpr double kFar = 3.0;        // resolutions off: what sees no surface, or is farther
+constexpr double kBetter = 0.98;    // times that of the step before
+constexpr double kStiffness = 0.2;  // of a pair of pieces, over the weight of the samples of one
+constexpr double kDamping = 1e-4;   // of a piece's motion, likewise
+constexpr double kSpread =
+    1e-6;  // squares, across a piece over along it: less is a line, whose turn is not known
+constexpr double kLeastSlope = 0.3;    // of the gradient: less is the edge of the band, or between two sheets
 constexpr double kLeastWeight = 1e-9;  // of a particle's own piece
 constexpr double kSameWay = 0.5;       // cosine between the turned normal and the surface's
 
@@ -35,6 +37,7 @@ struct Piece {
     std::vector<int> beside;  // pieces, ascending
     Vec3 middle = Vec3::Zero(), shift = Vec3::Zero();
     Mat3 turn = Mat3::Identity();
+    double size2 = 0.0;  // mean square of how far its particles are from the middle
 
     Vec3 moved(const Vec3& x) const { return turn * (x - middle) + middle + shift; }
 };
@@ -86,6 +89,8 @@ std::vector<Piece> make_pieces(const Adjacency& ring, const std::vector<Vec3>& a
             for (const int j : ring.of(i))
                 if (piece_of[j] != static_cast<int>(k)) piece.beside.push_back(piece_of[j]);
         }
+        for (const int i : piece.particles)
+            piece.size2 += (at[i] - piece.middle).squaredNorm() / static_cast<double>(piece.particles.size());
         std::sort(piece.beside.begin(), piece.beside.end());
         piece.beside.erase(std::unique(piece.beside.begin(), piece.beside.end()), piece.beside.end());
     }
@@ -102,11 +107,23 @@ Mat3 cross_matrix(const Vec3& v) {
 struct Pull {
     Mat6 squares = Mat6::Zero();
     Vec6 products = Vec6::Zero();
-    double sum = 0.0, weight = 0.0;  // of squared residuals
+    double off2 = 0.0, samples = 0.0;  // squared distances off the surface; what sees none is far off
+
+    /// For a piece that nothing holds.
+    Vec6 solve(double size2) const { return damped(size2).ldlt().solve(products); }
+    /// `size2`: square of how far the piece reaches.
+    Mat6 damped(double size2) const {
+        Mat6 result = squares;
+        result.diagonal().head<3>().array() += kDamping * kSamples * size2;
+        result.diagonal().tail<3>().array() += kDamping * kSamples;
+        return result;
+    }
 };
 
-Pull pull_of(const Piece& piece, const Particles& particles, double robust, Surface::Probe& probe) {
+Pull pull_of(const Piece& piece, const Particles& particles, double robust, double resolution,
+             Surface::Probe& probe) {
     Pull pull;
+    const double far = kFar * resolution;
     const std::size_t step = 1 + (piece.particles.size() - 1) / kSamples;
     const Vec3 centre = piece.middle + piece.shift;
     for (std::size_t s = 0; s < piece.particles.size(); s += step) {
@@ -114,17 +131,17 @@ Pull pull_of(const Piece& piece, const Particles& particles, double robust, Surf
         const Vec3 x = piece.moved(particles.position[i]);
         const Surface::Sample f = probe.sample(x);
         const double slope = f.gradient.norm();
-        if (!(slope > kLeastSlope)) continue;
         const Vec3 n = f.gradient / slope;
-        if (!(n.dot(piece.turn * particles.normal[i]) > kSameWay)) continue;
+        pull.samples += 1.0;
+        pull.off2 += far * far;
+        if (!(slope > kLeastSlope && n.dot(piece.turn * particles.normal[i]) > kSameWay)) continue;
         const double off = f.value / slope, relative = off / robust;
         const double w = 1.0 / ((1.0 + relative * relative) * (1.0 + relative * relative));
         Vec6 row;
         row << (x - centre).cross(n), n;
         pull.squares += w * row * row.transpose();
         pull.products -= w * off * row;
-        pull.sum += off * off;
-        pull.weight += 1.0;
+        pull.off2 += std::min(off * off - far * far, 0.0);
     }
     return pull;
 }
@@ -136,16 +153,19 @@ using Solver = Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower>;
 /// other. Of the matrix, which is symmetric, there is the lower half.
 class Equations {
 public:
-    explicit Equations(std::size_t pieces)
-        : unknowns_(static_cast<Eigen::Index>(6 * pieces)), right_(Eigen::VectorXd::Zero(unknowns_)) {}
+    explicit Equations(const std::vector<Piece>& pieces) : first_(pieces.size(), kNone) {
+        for (std::size_t k = 0; k < pieces.size(); ++k)
+            if (!pieces[k].beside.empty()) first_[k] = std::exchange(unknowns_, unknowns_ + 6);
+        right_.setZero(unknowns_);
+    }
 
     void add(const std::vector<Piece>& pieces, std::size_t k, const Pull& pull, double resolution) {
         using Row = Eigen::Matrix<double, 6, 3>;
         const Piece& piece = pieces[k];
-        const auto first = static_cast<Eigen::Index>(6 * k);
-        constexpr double kWeight = static_cast<double>(kSamples), kHold = kStiffness * kWeight;
+        const Eigen::Index first = first_[k];
+        constexpr double kHold = kStiffness * kSamples;
         double size2 = resolution * resolution;
-        Mat6 own = pull.squares;
+        Mat6 own = Mat6::Zero();
         right_.segment<6>(first) += pull.products;
         for (const int l : piece.beside) {
             // Where this piece would take the middle of the one beside it, less where that takes it.
@@ -154,7 +174,7 @@ public:
                        apart = piece.moved(other.middle) - (other.middle + other.shift);
             Row here;
             here << cross_matrix(arm), Mat3::Identity();
-            const Eigen::Index shift = 6 * l + 3;
+            const Eigen::Index shift = first_[l] + 3;
             own += kHold * here * here.transpose();
             if (l < static_cast<int>(k))
                 add_block(first, shift, -kHold * here);
@@ -165,14 +185,15 @@ public:
             right_.segment<3>(shift) += kHold * apart;
             size2 = std::max(size2, arm.squaredNorm());
         }
-        own.diagonal().head<3>().array() += kDamping * kWeight * size2;
-        own.diagonal().tail<3>().array() += kDamping * kWeight;
+        own += pull.damped(size2);
         for (int a = 0; a < 6; ++a)
             for (int b = 0; b <= a; ++b) add_entry(first + a, first + b, own(a, b));
     }
 
-    /// Nothing where there is no answer. `solver`: that of equations for the same pieces, or a new one.
+    /// From `first(k)` on a turn and a shift. Nothing where there is no answer. `solver`: that of equations
+    /// for the same pieces, or a new one.
     Eigen::VectorXd solve(Solver& solver) const {
+        if (unknowns_ == 0) return right_;
         SparseMatrix matrix(unknowns_, unknowns_);
         matrix.setFromTriplets(entries_.begin(), entries_.end());
         if (solver.rows() != unknowns_) solver.analyzePattern(matrix);
@@ -182,6 +203,8 @@ public:
         if (!solution.allFinite()) solution.resize(0);
         return solution;
     }
+
+    Eigen::Index first(std::size_t k) const { return first_[k]; }
 
 private:
     void add_entry(Eigen::Index row, Eigen::Index column, double value) {
@@ -193,7 +216,9 @@ private:
             for (Eigen::Index b = 0; b < block.cols(); ++b) add_entry(row + a, column + b, block(a, b));
     }
 
-    Eigen::Index unknowns_;
+    static constexpr Eigen::Index kNone = -1;
+    std::vector<Eigen::Index> first_;  // unknown of each piece; none for what nothing holds
+    Eigen::Index unknowns_ = 0;
     std::vector<Eigen::Triplet<double>> entries_;
     Eigen::VectorXd right_;
 };
@@ -226,47 +251,63 @@ std::vector<Vec3> blended(const std::vector<Piece>& pieces, const std::vector<Ve
     return result;
 }
 
+/// Takes a step; false where there is no answer.
+bool step_on(std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double resolution, Solver& solver) {
+    Equations equations(pieces);
+    for (std::size_t k = 0; k < pieces.size(); ++k)
+        if (!pieces[k].beside.empty()) equations.add(pieces, k, pulls[k], resolution);
+    const Eigen::VectorXd solution = equations.solve(solver);
+    for (std::size_t k = 0; k < pieces.size(); ++k)
+        if (!pieces[k].beside.empty() && solution.size() == 0) return false;
+    parallel_for_each(pieces.size(), 64, [&](std::size_t k) {
+        Vec6 own;
+        if (pieces[k].beside.empty())
+            own = pulls[k].solve(std::max(pieces[k].size2, resolution * resolution));
+        else
+            own = solution.segment<6>(equations.first(k));
+        if (!own.allFinite()) return;
+        const double angle = own.head<3>().norm();
+        if (angle > 0.0)
+            pieces[k].turn =
+                Eigen::AngleAxisd(angle, own.head<3>() / angle).toRotationMatrix() * pieces[k].turn;
+        pieces[k].shift += own.tail<3>();
+    });
+    return true;
+}
+
 }  // namespace
 
 std::optional<std::vector<Vec3>> register_to(const Surface& surface, const Particles& particles,
                                              const Adjacency& ring, const std::vector<Vec3>& guess) {
     const double resolution = surface.resolution();
     std::vector<Piece> pieces = make_pieces(ring, particles.position);
-    for (Piece& piece : pieces) move_as(particles.position, guess, piece);
+    parallel_for_each(pieces.size(), 16,
+                      [&](std::size_t k) { move_as(particles.position, guess, pieces[k]); });
     ThreadProbes probes(surface);
     std::vector<Pull> pulls(pieces.size());
     Solver solver;
-    double robust = 2.0 * resolution, off_before = std::numeric_limits<double>::infinity();
-    for (int step = 0; step < kMostSteps; ++step) {
+    std::vector<Piece> best;
+    double robust = 2.0 * resolution, least = std::numeric_limits<double>::infinity();
+    for (int step = 0; step <= kMostSteps; ++step) {
         parallel_for_each(pieces.size(), 4, [&](std::size_t k) {
-            pulls[k] = pull_of(pieces[k], particles, robust, probes.local());
+            pulls[k] = pull_of(pieces[k], particles, robust, resolution, probes.local());
         });
-        double sum = 0.0, weight = 0.0;
+        double off2 = 0.0, samples = 0.0;
         for (const Pull& pull : pulls) {
-            sum += pull.sum;
-            weight += pull.weight;
+            off2 += pull.off2;
+            samples += pull.samples;
         }
-        const double off = std::sqrt(sum / weight);  // not a number without any
-        if (!(off > kArrived * resolution && off < kBetter * off_before)) {
-            if (step == 0) return std::nullopt;
-            break;
-        }
-        off_before = off;
+        const double off = std::sqrt(off2 / samples);
+        if (!(off < least)) break;
+        const bool is_enough = !(off > kArrived * resolution && off < kBetter * least);
+        if (step == 0 && is_enough) break;  // as it is
+        least = off;
+        if (step > 0) best = pieces;
         robust = std::max(resolution, 2.0 * off);
-        Equations equations(pieces.size());
-        for (std::size_t k = 0; k < pieces.size(); ++k) equations.add(pieces, k, pulls[k], resolution);
-        const Eigen::VectorXd solution = equations.solve(solver);
-        if (solution.size() == 0) break;
-        for (std::size_t k = 0; k < pieces.size(); ++k) {
-            const Vec6 own = solution.segment<6>(static_cast<Eigen::Index>(6 * k));
-            const double angle = own.head<3>().norm();
-            if (angle > 0.0)
-                pieces[k].turn =
-                    Eigen::AngleAxisd(angle, own.head<3>() / angle).toRotationMatrix() * pieces[k].turn;
-            pieces[k].shift += own.tail<3>();
-        }
+        if (is_enough || !step_on(pieces, pulls, resolution, solver)) break;
     }
-    return blended(pieces, particles.position);
+    if (best.empty()) return std::nullopt;
+    return blended(best, particles.position);
 }
 
 }  // namespace isotrack

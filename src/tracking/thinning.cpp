@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <queue>
+#include <set>
 #include <utility>
 
 #include "find_in_blocks.h"
@@ -111,7 +112,7 @@ public:
                 continue;
             }
             const auto closing = changed_[i] ? closing_of(i, probes.local()) : std::move(at_first[number[i]]);
-            if (!closing.empty() && all_keep_a_fan(closing)) take_out(i, closing);
+            if (!closing.empty() && fits(closing, i)) take_out(i, closing);
         }
         std::vector<Triangle> rest;
         for (std::size_t t = 0; t < triangles_.size(); ++t)
@@ -192,11 +193,24 @@ private:
         return closing;
     }
 
-    /// Two triangles are none: they would lie back to back. Changes farther off than the ring of one decide.
-    bool all_keep_a_fan(const std::vector<Triangle>& closing) const {
-        return std::all_of(closing.begin(), closing.end(), [&](const Triangle& t) {
-            return std::all_of(t.begin(), t.end(), [&](int v) { return around_[v].size() > 3; });
-        });
+    /// Whether the mesh stays one: whoever is left keeps a fan of three triangles, and no edge that comes is
+    /// there already. Changes farther off than the ring of one decide.
+    bool fits(const std::vector<Triangle>& closing, int gone) const {
+        const auto share = [&](int v, int w) {
+            return std::any_of(around_[v].begin(), around_[v].end(), [&](int t) {
+                const Triangle& corner = triangles_[t];
+                return std::find(corner.begin(), corner.end(), w) != corner.end() &&
+                       std::find(corner.begin(), corner.end(), gone) == corner.end();
+            });
+        };
+        std::set<std::pair<int, int>> edges;
+        for (const Triangle& t : closing)
+            for (int k = 0; k < 3; ++k) {
+                const int v = t[k], w = t[(k + 1) % 3];
+                if (around_[v].size() <= 3) return false;
+                if (!edges.insert(std::minmax(v, w)).second && share(v, w)) return false;  // between two
+            }
+        return true;
     }
 
     void take_out(int i, const std::vector<Triangle>& closing) {

@@ -4,24 +4,25 @@
 #include <vector>
 
 #include "isotrack/sampling/particles.h"
-#include "isotrack/sampling/sizing.h"
 #include "isotrack/surface/crossing_grid.h"
 
 namespace isotrack {
 
 /// What a particle may leave behind.
 struct ThinningLimits {
-    double crowded = 0.7;  ///< It may go below this distance to the nearest neighbour, in units of the
-                           ///< spacing as `PopulationBand`.
-    double error = 0.0;    ///< Largest error of the triangles that close its gap, world units.
-    double reach = 0.0;    ///< Largest distance of a crossing from them, unless it was farther off before.
-    double detail = 0.0;   ///< As `SizingLimits`.
+    double crowded;  ///< It may go below this distance to the nearest neighbour, in units of the
+                     ///< spacing as `PopulationBand`.
+    double error;    ///< Largest error of the triangles that close its gap, world units.
+    double reach;    ///< Largest distance of a crossing from them, unless it was farther off before.
+    double detail;   ///< As `SizingLimits`.
 };
 
 /// Takes particles away, the most crowded first, whose gap in the mesh of `triangles` can be closed by
 /// triangles that are near enough to the surface, and it to them, do not turn from it, and have no angle
-/// below 30 degrees or none sharper than those that go. Returns flags for `Particles::retain`; `triangles`
-/// are then those of the mesh without them, and still have the old numbers.
+/// below 30 degrees or none sharper than those that go. Whoever is on a rim, in no
+/// fan, or faces away from all neighbours stays. Uses TBB inside; the same at any thread count. Returns flags
+/// for `Particles::retain`; `triangles` are then those of the mesh without them, and still have the old
+/// numbers.
 std::vector<char> thin(const Particles& particles, std::vector<Triangle>& triangles, const Surface& surface,
                        const CrossingGrid& crossings, const ThinningLimits& limits);
 

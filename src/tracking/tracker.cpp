@@ -231,7 +231,9 @@ struct Tracker::Impl {
             moves[i] = particles.id[i] < first_of_frame;
             if (!moves[i]) particles.velocity[i].setZero();
         }
-        for (int layer = 0; layer < kMostLayers; ++layer) {
+        bool any = true;
+        for (int layer = 0; any && layer < kMostLayers; ++layer) {
+            any = false;
             std::vector<int> count(particles.size(), 0);
             for (const Triangle& t : triangles)
                 for (const int i : t)
@@ -242,6 +244,7 @@ struct Tracker::Impl {
                     }
             for (std::size_t i = 0; i < particles.size(); ++i) {
                 if (count[i] == 0) continue;
+                any = true;
                 particles.velocity[i] /= count[i];
                 moves[i] = 1;
             }
@@ -335,7 +338,6 @@ void Tracker::Impl::follow(const Surface& surface, const CrossingGrid& crossings
         const double enough = (options.fit ? kUnfitted : 1.0) * l.tolerance;
         keep = thin(particles, last_mesh.triangles, surface, crossings,
                     {pace.band.crowded, kThinned * enough, kCertified * enough, l.detail});
-        last_mesh.ring = ring_of(last_mesh.triangles, particles.size());
     } else {
         keep = uncrowded(particles, last_mesh.ring, pace.band);
     }
@@ -464,8 +466,6 @@ void Tracker::Impl::Making::mesh_particles() {
         if (in_paper()) break;
         work_.inspection =
             mending == 0 ? inspector.inspect(work_.mesh) : inspector.inspect_both_ways(work_.mesh);
-        last_mesh.evidence.error =
-            errors_at_particles(work_.mesh, *work_.inspection.errors, particles().size());
         densifier_.emplace(tracker_.make_densifier(work_.surface, work_.limits, work_.crossings->size()));
         added_ = mend();
         if (mending == kMostMendings ||

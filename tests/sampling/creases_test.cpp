@@ -80,6 +80,19 @@ TEST(ReturnToCreases, BringsBackWhoHasSlidOffALittle) {
         EXPECT_LT((particles.position[i] - wanted[i]).norm(), 1e-4) << particles.position[i].transpose();
 }
 
+TEST(ReturnToCreases, BringsNobodyNextToAnother) {
+    const auto box = shapes::box({0, 0, 0}, {1, 1, 1}, kResolution);
+    for (const double beside : {0.31, 0.4}) {
+        Particles particles;
+        particles.add({1, 0.99, 0.3}, {1, 0, 0}, kSpacing, 0);
+        particles.add({1, 1, beside}, {1, 0, 0}, kSpacing, 1);
+        particles.add({0.9, 1, 0.35}, {0, 1, 0}, kSpacing, 2);
+        return_to_creases(particles, from_pairs({{0, 1}, {1, 0}, {0, 2}, {2, 0}, {1, 2}, {2, 1}}, 3), *box);
+        const Vec3 wanted = beside < 0.35 ? Vec3(1, 0.99, 0.3) : Vec3(1, 1, 0.3);
+        EXPECT_LT((particles.position[0] - wanted).norm(), 1e-4) << beside;
+    }
+}
+
 TEST(ReturnToCreases, LeavesWhatIsSmoothWhereItIs) {
     const auto torus = shapes::torus({0, 0, 0}, 1.0, 0.3, kResolution);
     Particles particles;

@@ -183,5 +183,22 @@ TEST(Relax, StopsWhenAllAreAtRest) {
     EXPECT_EQ(relax(particles, adjacency_of(particles), *shapes::sphere({0, 0, 0}, 1.0, 0.1), 0), 0);
 }
 
+TEST(Relax, MovesThoseAloneThatAreRestless) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    Particles particles = random_on_unit_sphere(400, 0.15);
+    const Particles before = particles;
+    std::vector<char> restless(particles.size());
+    for (std::size_t i = 0; i < particles.size(); ++i) restless[i] = particles.position[i].x() > 0.5;
+    relax(particles, adjacency_of(particles), *sphere, 3, restless);
+    std::size_t moved = 0;
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+        if (!restless[i]) {
+            ASSERT_EQ(particles.position[i], before.position[i]);
+        }
+        moved += particles.position[i] != before.position[i];
+    }
+    EXPECT_GT(moved, 50u);
+}
+
 }  // namespace
 }  // namespace isotrack

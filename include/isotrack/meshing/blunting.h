@@ -36,8 +36,8 @@ public:
 
     /// Looks at the triangles with an angle below 30 degrees, sharpest first, but for those that were looked
     /// at in vain and have not changed since; so often, or until nothing changes. Flips the longest edge, or
-    /// moves a corner that is movable along the surface; where that edge is shorter than half a detail only
-    /// as long as there are few. Its height above it is kept; one of a hundredth of `tolerance` or more may
+    /// moves a corner that is movable along the surface; of triangles shorter than half a detail only in so
+    /// many tries. Its height above it is kept; one of a hundredth of `tolerance` or more may
     /// become a quarter of that higher or lower where it must. A change is made where the smallest angle of
     /// the triangles concerned grows by a tenth or more or to 30 degrees, and all of them face the way the
     /// surface does (at a corner or the centroid), or no worse than before, are within `tolerance` of it,

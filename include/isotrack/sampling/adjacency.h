@@ -9,7 +9,8 @@
 namespace isotrack {
 
 /// Neighbours of every particle: those of i are adjacent[first[i]] to adjacent[first[i + 1] - 1], ascending.
-/// Symmetric.
+/// /// Symmetric, but for what `squared` of some makes.
+
 struct Adjacency {
     std::vector<int> first{0};
     std::vector<int> adjacent;
@@ -28,8 +29,8 @@ struct Adjacency {
     /// Of `count` particles: `newborn` k, neighbour of three others, is number `size() + k`; the rest have no
     /// neighbours yet.
     Adjacency extended(const std::vector<std::array<int, 3>>& newborn, std::size_t count) const;
-    /// Neighbours and their neighbours: of those whose flag is set, or of all if there are no flags; the others
-    /// have none then.
+    /// Neighbours and their neighbours: of those whose flag is set, or of all if there are no flags; the
+    /// others have none then, and may be neighbours of some all the same: they must not move meanwhile.
     Adjacency squared(const std::vector<char>& some = {}) const;
 };
 

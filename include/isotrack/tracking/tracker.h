@@ -73,7 +73,7 @@ struct TrackedFrame {
     /// Vertices beyond these are copies that keep the mesh manifold, or of such drops.
     std::size_t particles = 0;
     std::size_t born = 0, died = 0, seeded = 0, lost = 0;
-    int sweeps = 0;             ///< Relaxation sweeps over all particles.
+    int sweeps = 0;             ///< Relaxation sweeps, over those particles that had to move.
     std::size_t relocated = 0;  ///< Vertices the tetrahedralisation moved one by one.
     std::string delaunay_strategy;
     double tolerance = 0.0;  ///< The effective one.
@@ -111,8 +111,9 @@ public:
     /// Where a point of the last frame is expected in the next: a velocity field's guess.
     using Motion = std::function<Vec3(const Vec3&)>;
 
-    /// Goes on to the next frame, or starts. Without `motion` the particles' own last displacements are
-    /// extrapolated. An empty surface gives an empty mesh and drops all particles; the next surface with
+    /// Goes on to the next frame, or starts. Without `motion` the particles move as
+    /// the surfaces themselves show, along them, too: from their last displacements on, each piece as rigidly
+    /// as it can. An empty surface gives an empty mesh and drops all particles; the next surface with
     /// something in it starts afresh, ids counting on.
     TrackedFrame advance(const Surface& surface, const Motion& motion = {});
 
