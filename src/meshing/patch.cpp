@@ -233,14 +233,15 @@ private:
 };
 
 /// Flags for the vertices of a part: it is nearer to what goes than to what stays, and not in the seam.
-std::vector<char> coming_vertices(const Part& part, const TriangleBins& mesh, const std::vector<char>& gone,
+std::vector<char> coming_vertices(const Part& part, const TriangleBins& mesh, const std::vector<int>& gone,
                                   const std::vector<std::pair<int, int>>& border, PatchSource& source) {
     source.look_beside(part.vertices, mesh);
     const Seam seam(border, mesh.points(), kSeam * source.spacing());
     std::vector<char> result;
     for (const int v : part.vertices) {
         const int beside = source.beside(v);
-        result.push_back(beside >= 0 && gone[beside] && !seam.is_near(source.bins().points()[v]));
+        result.push_back(std::binary_search(gone.begin(), gone.end(), beside) &&
+                         !seam.is_near(source.bins().points()[v]));
     }
     return result;
 }
@@ -381,15 +382,14 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
     if (gone.empty()) return std::nullopt;
     const std::vector<Vec3>& points = mesh.points();
     Patch patch;
-    patch.gone.assign(mesh.triangles().size(), 0);
-    for (const int t : gone) patch.gone[t] = 1;
+    patch.gone = gone;
     const std::vector<Triangle> going = some_of(mesh.triangles(), gone);
     const auto border = border_of(going);
     Box bounds;
     for (const int t : gone) bounds.extend(mesh.box_of(t));
     const Vec3 margin = Vec3::Constant(kMargin * source.spacing());
     Part part = part_within(Box(bounds.min() - margin, bounds.max() + margin), source.bins());
-    const auto comes = coming_vertices(part, mesh, patch.gone, border, source);
+    const auto comes = coming_vertices(part, mesh, gone, border, source);
     // What comes and the border have numbers of their own, the border's behind the others.
     const auto own = part.vertices.size();
     std::vector<Vec3> at, normals;

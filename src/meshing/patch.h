@@ -12,7 +12,7 @@ namespace isotrack {
 
 /// What goes and what comes.
 struct Patch {
-    std::vector<char> gone;           ///< Per triangle of the mesh.
+    std::vector<int> gone;            ///< Triangles of the mesh, ascending.
     std::vector<Vec3> points;         ///< Numbered on from those of the mesh: all that come are among them.
     std::vector<Triangle> triangles;  ///< That come.
     long components = 0, euler = 0;   ///< How much more of them there are in what comes than in what goes.
@@ -50,7 +50,7 @@ private:
 /// Ascending.
 std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh);
 
-/// `gone`, with a border that is pinched nowhere, goes. The triangles of `source` that are nearest to them
+/// `gone`, ascending, with a border that is pinched nowhere, goes. The triangles of `source` that are nearest to them
 /// come, less a seam about as wide as its spacing; strips of triangles that face as the source does, if any
 /// do, fill the seam from each loop of the one border to one of the other, and what they cross of what comes
 /// is left out. nullopt where the loops do not match. The mesh must be closed and manifold, and so is what it

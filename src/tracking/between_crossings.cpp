@@ -55,11 +55,9 @@ std::vector<float> turns_at_vertices(const std::vector<Vec3>& vertices,
 
 }  // namespace
 
-std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>& vertices,
-                                                        const std::vector<Triangle>& triangles,
-                                                        const MeshDistances& at_crossings) {
-    std::vector<std::atomic<char>> at_fold(crossings_.size());  // and nearly too far off for it
-    const std::vector<float> turns = turns_at_vertices(vertices, triangles);
+void BetweenCrossings::flag_at_folds(const std::vector<Triangle>& triangles, const std::vector<float>& turns,
+                                     const std::vector<Vec3>& vertices, const MeshDistances& at_crossings,
+                                     Flags& at_fold) const {
     const double spacing = crossings_.spacing();
     const bool thinned_out = crossings_.thinned_out(surface_);
     const Vec3 reach = Vec3::Constant(tolerance_);
@@ -75,20 +73,20 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
             if (at_crossings[c] > nearly) at_fold[c].store(1, std::memory_order_relaxed);
         });
     });
-    looked_at_.resize(crossings_.size(), 0);
-    const double nearly = std::max(kNearlyTooFar * tolerance_, tolerance_ - kFarther * spacing);
-    constexpr std::size_t kBlock = 32768;
-    const auto doubtful = find_in_blocks<int>(
-        crossings_.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
-            for (std::size_t c = begin; c < end; ++c) {
-                const double d = at_crossings[c];
-                if (looked_at_[c] || d > kCertified * tolerance_) continue;
-                if (!(d > nearly || (at_fold[c] && !crossings_[c].flat))) continue;
-                looked_at_[c] = 1;
-                found.push_back(static_cast<int>(c));
-            }
-        });
-    if (!thinned_out) return cells_.around(doubtful);
+}
+
+bool BetweenCrossings::take_doubtful(std::size_t crossing, const MeshDistances& at_crossings,
+                                     const Flags& at_fold) {
+    const double nearly = std::max(kNearlyTooFar * tolerance_, tolerance_ - kFarther * crossings_.spacing());
+    const double d = at_crossings[crossing];
+    if (looked_at_[crossing] || d > kCertified * tolerance_) return false;
+    if (!(d > nearly || (at_fold[crossing] && !crossings_[crossing].flat))) return false;
+    looked_at_[crossing] = 1;
+    return true;
+}
+
+std::vector<Surface::Crossing> BetweenCrossings::points_beside(const std::vector<int>& doubtful) {
+    if (!crossings_.thinned_out(surface_)) return cells_.around(doubtful);
     std::vector<Surface::Crossing> result;
     for (const bool flat : {false, true}) {
         std::vector<Vec3> places;
@@ -100,6 +98,58 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
         result.insert(result.end(), near.begin(), near.end());
     }
     return result;
+}
+
+std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>& vertices,
+                                                        const std::vector<Triangle>& triangles,
+                                                        const MeshDistances& at_crossings) {
+    Flags at_fold(crossings_.size());
+    flag_at_folds(triangles, turns_at_vertices(vertices, triangles), vertices, at_crossings, at_fold);
+    looked_at_.resize(crossings_.size(), 0);
+    constexpr std::size_t kBlock = 32768;
+    return points_beside(find_in_blocks<int>(
+        crossings_.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
+            for (std::size_t c = begin; c < end; ++c)
+                if (take_doubtful(c, at_crossings, at_fold)) found.push_back(static_cast<int>(c));
+        }));
+}
+
+std::vector<Surface::Crossing> BetweenCrossings::points_near(const std::vector<Box>& changed, double cutoff,
+                                                             const std::vector<Vec3>& vertices,
+                                                             const std::vector<Triangle>& triangles,
+                                                             const MeshDistances& at_crossings) {
+    // Distances changed within a cutoff of what changed, turns at its vertices.
+    std::vector<int> near;
+    std::vector<char> is_near(crossings_.size(), 0);
+    for (const Box& box : changed)
+        crossings_.for_each_in(Box(box.min() - Vec3::Constant(cutoff), box.max() + Vec3::Constant(cutoff)),
+                               [&](std::size_t c) {
+                                   if (!is_near[c]) near.push_back(static_cast<int>(c));
+                                   is_near[c] = 1;
+                               });
+    std::sort(near.begin(), near.end());
+    const std::vector<char> columns = crossings_.columns_of(near);
+    std::vector<char> beside(triangles.size()), at(vertices.size(), 0);
+    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
+        Box box;
+        for (const int v : triangles[t]) box.extend(vertices[v]);
+        const Vec3 reach = Vec3::Constant(tolerance_);
+        beside[t] = crossings_.meets(Box(box.min() - reach, box.max() + reach), columns);
+    });
+    std::vector<Triangle> some, around;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        if (!beside[t]) continue;
+        some.push_back(triangles[t]);
+        for (const int v : triangles[t]) at[v] = 1;
+    }
+    for (const Triangle& t : triangles)
+        if (at[t[0]] || at[t[1]] || at[t[2]]) around.push_back(t);
+    Flags at_fold(crossings_.size());
+    flag_at_folds(some, turns_at_vertices(vertices, around), vertices, at_crossings, at_fold);
+    std::vector<int> doubtful;
+    for (const int c : near)
+        if (take_doubtful(c, at_crossings, at_fold)) doubtful.push_back(c);
+    return points_beside(doubtful);
 }
 
 }  // namespace isotrack

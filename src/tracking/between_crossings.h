@@ -1,6 +1,7 @@
 // Where a mesh may miss the surface between lattice crossings although it reaches them.
 #pragma once
 
+#include <atomic>
 #include <vector>
 
 #include "isotrack/meshing/manifold.h"
@@ -28,7 +29,23 @@ public:
                                           const std::vector<Triangle>& triangles,
                                           const MeshDistances& at_crossings);
 
+    /// The same of a mesh that differs from the one looked at last by triangles in these boxes alone, those
+    /// that went among them. `cutoff`: of the distances.
+    std::vector<Surface::Crossing> points_near(const std::vector<Box>& changed, double cutoff,
+                                               const std::vector<Vec3>& vertices,
+                                               const std::vector<Triangle>& triangles,
+                                               const MeshDistances& at_crossings);
+
 private:
+    using Flags = std::vector<std::atomic<char>>;
+    /// Flags the crossings that are nearly too far off for a fold at these triangles.
+    void flag_at_folds(const std::vector<Triangle>& triangles, const std::vector<float>& turns,
+                       const std::vector<Vec3>& vertices, const MeshDistances& at_crossings,
+                       Flags& at_fold) const;
+    /// Whether it is looked at from now on, and was not before.
+    bool take_doubtful(std::size_t crossing, const MeshDistances& at_crossings, const Flags& at_fold);
+    std::vector<Surface::Crossing> points_beside(const std::vector<int>& doubtful);
+
     const Surface& surface_;
     const CrossingGrid& crossings_;
     const double tolerance_;

@@ -11,8 +11,13 @@ namespace isotrack {
 /// A triangle by the cell and facet it is, and where its corners are.
 struct Facet {
     int key;  ///< Ascending over a mesh but for halves of split triangles and those put in, which have -1 and
-              ///< equal nothing.
+              ///< equal nothing; see `same_corners`.
     std::array<Eigen::Vector3f, 3> corner;  ///< Vertices are rounded to floats before they are looked at.
+    Box box() const {
+        Box result;
+        for (const Eigen::Vector3f& c : corner) result.extend(c.cast<double>());
+        return result;
+    }
     bool operator==(const Facet& o) const { return key >= 0 && key == o.key && corner == o.corner; }
 };
 
@@ -47,5 +52,10 @@ void compare(const MeshFacets& now, const std::vector<Facet>& before, const Same
     }
     while (old < before.size()) went(old++);
 }
+
+/// Of what came and went, which have no key, those that are the same after all, by their corners: pairs of
+/// indices into both, in any order.
+std::vector<std::array<std::size_t, 2>> same_corners(const std::vector<Facet>& came,
+                                                     const std::vector<Facet>& went);
 
 }  // namespace isotrack

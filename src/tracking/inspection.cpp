@@ -23,7 +23,14 @@ constexpr double kAroundChanges = 2.01;                    // cutoffs: and some 
 constexpr double kFaultReach = 1.5;                        // resolutions
 constexpr double kMissedSpacing = 0.75, kMissedAt = 1.3;   // resolutions, tolerances: no particle is nearer
 constexpr double kFaultSpacing = 0.8, kVainSpacing = 0.4;  // resolutions
-constexpr double kLeastDoubtful = 0.01;  // resolutions: denser than that nothing near a fault was mended
+// Resolutions: denser than that nothing near a fault was mended; or not much, where very many are.
+constexpr double kLeastDoubtful = 0.01, kLeastWhereMany = 0.25;
+constexpr std::size_t kManyDoubtful = 64;
+
+/// Around so many doubtful places.
+double least_spacing(std::size_t places, const Surface& surface) {
+    return (places > kManyDoubtful ? kLeastWhereMany : kLeastDoubtful) * surface.resolution();
+}
 
 struct Corners {
     Triangle particle;
@@ -150,25 +157,46 @@ std::vector<TriangleError> Inspector::errors_of(const std::vector<Vec3>& corners
 }
 
 std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
+    constexpr std::size_t kSame = ~std::size_t{0};
     const MeshFacets facets(mesh.carved, mesh.vertices);
     std::vector<const TriangleError*> known(facets.size(), nullptr);
     std::vector<char> seen(facets.size(), 0);  // in the mesh before
     changes_ = {};
+    const auto take_same = [&](std::size_t f, std::size_t old) {
+        known[f] = &(*errors_)[old];
+        seen[f] = 1;
+    };
+    struct Unkeyed {
+        std::vector<std::size_t> number;
+        std::vector<Facet> facet;
+        void add(std::size_t n, const Facet& f) {
+            number.push_back(n);
+            facet.push_back(f);
+        }
+    } came, went;
     compare(
-        facets, facets_,
-        [&](std::size_t f, std::size_t old) {
-            known[f] = &(*errors_)[old];
-            seen[f] = 1;
-        },
+        facets, facets_, take_same,
         [&](std::size_t f, const Facet& facet) {
+            if (facet.key < 0) return came.add(f, facet);
             if (measured_) changes_.came.push_back(facet);
             const auto [corner, whole] = corners_of(mesh.carved, f);
             const int e = expected_ && whole ? expected_->triangles.find(corner) : -1;
             if (e >= 0) known[f] = &expected_->errors[e];
         },
         [&](std::size_t old) {
+            if (facets_[old].key < 0) return went.add(old, facets_[old]);
             if (measured_) changes_.went.push_back(facets_[old]);
         });
+    for (const auto& [c, w] : same_corners(came.facet, went.facet)) {
+        take_same(came.number[c], went.number[w]);
+        came.number[c] = went.number[w] = kSame;
+    }
+    const auto take_changed = [&](const Unkeyed& some, std::vector<Facet>& changed) {
+        for (std::size_t i = 0; measured_ && i < some.number.size(); ++i)
+            if (some.number[i] != kSame) changed.push_back(some.facet[i]);
+    };
+    take_changed(came, changes_.came);
+    take_changed(went, changes_.went);
     changes_.many = static_cast<double>(std::max(changes_.came.size(), changes_.went.size())) >
                     kMany * static_cast<double>(facets.size());
     std::vector<Triangle> fresh;
@@ -213,7 +241,7 @@ void Inspector::take_missed(std::size_t d, Inspection& result) {
         std::vector<Shortage> at;
         for (const int i : survey.beyond)
             at.push_back({distances_[d].points()[i].point, kVainSpacing * surface_.resolution(),
-                          kLeastDoubtful * surface_.resolution()});
+                          least_spacing(survey.beyond.size(), surface_)});
         result.doubts.push_back({{}, 0.0, std::move(at)});
     } else if (survey.weight > 0.0) {
         result.crossings_mean_square = survey.sum_of_squares / survey.weight;
@@ -231,6 +259,8 @@ Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     Inspection result;
     doubt(measure_errors(mesh, result), kVainSpacing, result);
     measured_ = true;
+    for (const auto* changed : {&changes_.came, &changes_.went})
+        for (const Facet& facet : *changed) since_look_.push_back(facet.box());
     if (!changes_.many)
         changes_.around = triangles_near_gone(changes_.went, kAroundChanges * cutoff(), mesh.vertices,
                                               mesh.carved.triangles);
@@ -274,7 +304,13 @@ void Inspector::look_between(const FrameMesh& mesh, Inspection& inspection) {
         if (!thins_out()) diagonals = sides_ ? sides_->diagonals() : surface_.diagonals();
         between_crossings_.emplace(surface_, crossings_, diagonals, limits_.tolerance);
     }
-    auto points = between_crossings_->points(mesh.vertices, mesh.carved.triangles, distances_.front());
+    const bool all = !looked_between_ || static_cast<double>(since_look_.size()) >
+                                             kMany * static_cast<double>(mesh.carved.triangles.size());
+    auto points = all ? between_crossings_->points(mesh.vertices, mesh.carved.triangles, distances_.front())
+                      : between_crossings_->points_near(since_look_, cutoff(), mesh.vertices,
+                                                        mesh.carved.triangles, distances_.front());
+    looked_between_ = true;
+    since_look_.clear();
     if (!thins_out()) set_unreachable_aside(points);
     measure_between(points, mesh, inspection);
 }
@@ -297,7 +333,8 @@ std::vector<Surface::Crossing> Inspector::newly_missed(const Inspection& now,
 
 void Inspector::forget_distances() {
     for (MeshDistances& distances : distances_) distances.forget();
-    measured_ = false;
+    measured_ = looked_between_ = false;
+    since_look_.clear();
     for (std::vector<int>& missed : missed_) missed.clear();
 }
 
@@ -377,7 +414,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             {c.point, kMissedSpacing * std::max(surface.resolution(), kMissedAt * limits.tolerance)});
     for (const Doubt& doubt : inspection.doubts) {
         for (const Vec3& p : crossings_around(doubt.places, surface))
-            result.push_back({p, doubt.spacing, kLeastDoubtful * surface.resolution()});
+            result.push_back({p, doubt.spacing, least_spacing(doubt.places.size(), surface)});
         result.insert(result.end(), doubt.at.begin(), doubt.at.end());
     }
     for (const auto& e : carved.complex_edges)

@@ -14,8 +14,7 @@ std::vector<Triangle> triangles_near_gone(const std::vector<Facet>& went, double
                                           const std::vector<Vec3>& vertices,
                                           const std::vector<Triangle>& triangles) {
     Box box;
-    for (const Facet& facet : went)
-        for (const Eigen::Vector3f& corner : facet.corner) box.extend(corner.cast<double>());
+    for (const Facet& facet : went) box.extend(facet.box());
     if (box.isEmpty()) return {};
     const Box around(box.min() - Vec3::Constant(reach), box.max() + Vec3::Constant(reach));
     constexpr std::size_t kTrianglesPerBlock = 8192;

@@ -64,9 +64,31 @@ bool MeshTrials::may_have(const std::vector<Vec3>& corners) const {
     return largest_of(inspector_.errors_of(corners)) <= largest_allowed();
 }
 
+Inspection MeshTrials::inspect(const FrameMesh& mesh) const {
+    Inspection result = inspector_.inspect_both_ways(mesh);
+    inspector_.look_between(mesh, result);
+    return result;
+}
+
+void MeshTrials::look_back() {
+    // It may have looked at more points for the other.
+    Inspection now = inspector_.inspect_both_ways(mesh_);
+    now.topology = std::move(inspection_.topology);
+    now.doubts = std::move(inspection_.doubts);
+    inspection_ = std::move(now);
+}
+
+MeshTrials::Outlook MeshTrials::look_at(const FrameMesh& other) {
+    const Inspection after = inspect(other);
+    Outlook result{failing_in(after, limits_.tolerance), {}};
+    for (const auto& c : inspector_.newly_missed(after, mesh_.vertices, mesh_.carved.triangles))
+        result.newly_missed.push_back(c.point);
+    look_back();
+    return result;
+}
+
 bool MeshTrials::take(FrameMesh other, std::size_t most_failing) {
-    Inspection after = inspector_.inspect_both_ways(other);
-    inspector_.look_between(other, after);
+    Inspection after = inspect(other);
     const bool good = largest_of(*after.errors) <= largest_allowed() &&
                       after.farthest_crossing <= std::max(limits_.tolerance, inspection_.farthest_crossing) &&
                       after.lost_crossings <= inspection_.lost_crossings &&
@@ -77,11 +99,7 @@ bool MeshTrials::take(FrameMesh other, std::size_t most_failing) {
         inspection_ = std::move(after);
         is_topology_known_ = false;
     } else {
-        // What it saw last was another, for which it may have looked at more points.
-        Inspection now = inspector_.inspect_both_ways(mesh_);
-        now.topology = std::move(inspection_.topology);
-        now.doubts = std::move(inspection_.doubts);
-        inspection_ = std::move(now);
+        look_back();
     }
     return good;
 }

@@ -27,6 +27,11 @@ public:
     bool try_mesh(FrameMesh other);
     /// Takes a mesh if moreover it fails at fewer places.
     bool try_to_mend(FrameMesh other);
+    /// Where another mesh fails, and what it misses that the one there does not. That stays.
+    struct Outlook {
+        std::vector<Vec3> failing, newly_missed;
+    };
+    Outlook look_at(const FrameMesh& other);
     /// Takes a mesh that was there before.
     void put_back(FrameMesh mesh);
     /// Whether triangles, of three corners each, are near enough to the surface for a mesh that is taken.
@@ -36,6 +41,8 @@ public:
 
 private:
     double largest_allowed() const;
+    Inspection inspect(const FrameMesh& mesh) const;
+    void look_back();  // at the mesh there, after another
     bool take(FrameMesh other, std::size_t most_failing);
 
     FrameMesh& mesh_;

@@ -18,6 +18,8 @@
 #include "meshing/patch.h"
 #include "meshing/small_handles.h"
 #include "sampling/compact.h"
+#include "tracking/patch_batches.h"
+#include "tracking/patching.h"
 
 namespace isotrack {
 namespace {
@@ -33,8 +35,7 @@ constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
 constexpr double kTriedReach = 24.0, kLookReach = 4.0 * kSmall;
 constexpr double kMostArea = 50000.0,
                  kMostAreaOfPlace = 50.0;  // square: what goes, for all patches, for one
-constexpr double kFlat = 1e-3;             // twice the area over the square of the longest edge
-constexpr std::size_t kMostFailing = 64, kMostPlaces = 300;
+constexpr std::size_t kMostPlaces = 300;
 constexpr int kMostPatches = 1000, kMostTooFar = 50, kMostRefused = 50;  // see Effort
 constexpr std::size_t kMostTriangles = 10000000;                         // of the whole meshes they make
 constexpr double kLikelyShare = 0.8;            // of patches and area, for places that are likely
@@ -42,30 +43,8 @@ constexpr std::size_t kMostEverywhere = 20000;  // places all over a mesh
 constexpr long kMostAstray = 30;                // components and handles, to look for them there
 constexpr std::size_t kMostPairs = 100000000;   // of components
 
-/// Those of some places that are not near to one before; of very many the first.
-std::vector<Vec3> apart(const std::vector<Vec3>& places, double distance,
-                        std::size_t most = std::numeric_limits<std::size_t>::max()) {
-    std::map<std::array<double, 3>, std::vector<Vec3>> in_cube;
-    std::vector<Vec3> result;
-    for (const Vec3& place : places) {
-        if (result.size() == most) break;
-        const Vec3 cube = (place / distance).array().floor();
-        bool is_near = false;
-        for (int n = 0; n < 27; ++n) {
-            const Vec3 other = cube + Vec3(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
-            const auto found = in_cube.find({other.x(), other.y(), other.z()});
-            is_near = is_near || (found != in_cube.end() &&
-                                  std::any_of(found->second.begin(), found->second.end(),
-                                              [&](const Vec3& p) { return (p - place).norm() < distance; }));
-        }
-        if (is_near) continue;
-        in_cube[{cube.x(), cube.y(), cube.z()}].push_back(place);
-        result.push_back(place);
-    }
-    return result;
-}
-
-/// Where the mesh may have another topology than the lattice.
+/// Where the mesh may have another topology than the lattice: at faults, and at small handles of thin sheets
+/// unless there are very many.
 std::vector<Vec3> suspicious_places(const FrameMesh& mesh, const LatticeTopology& topology,
                                     const std::vector<double>& thickness, double resolution) {
     std::vector<Vec3> result = topology.faults;
@@ -74,9 +53,12 @@ std::vector<Vec3> suspicious_places(const FrameMesh& mesh, const LatticeTopology
         if (topology.speck[t]) result.push_back(mesh.vertices[mesh.carved.triangles[t][0]]);
     std::vector<char> at_thin;
     for (const int p : mesh.carved.particle) at_thin.push_back(p >= 0 && thickness[p] < kThin * resolution);
-    for (const int v : small_handles(mesh.vertices, mesh.carved.triangles, at_thin, kSmall * resolution))
-        result.push_back(mesh.vertices[v]);
-    return apart(result, kApart * resolution);
+    const std::vector<int> handles =
+        small_handles(mesh.vertices, mesh.carved.triangles, at_thin, kSmall * resolution);
+    const std::vector<Vec3> faults = apart(result, kApart * resolution);
+    for (const int v : handles) result.push_back(mesh.vertices[v]);
+    std::vector<Vec3> all = apart(result, kApart * resolution);
+    return all.size() > kMostPlaces ? faults : all;
 }
 
 /// The small components of mesh or lattice that the other does not have.
@@ -101,44 +83,16 @@ std::vector<Vec3> unmatched_components(const FrameMesh& mesh, const std::vector<
     return result;
 }
 
-FrameMesh patched(FrameMesh mesh, const Patch& patch) {
-    append(mesh, patch.points, patch.triangles);
-    std::vector<char> gone = patch.gone;
-    gone.resize(mesh.carved.triangles.size(), 0);
-    return without(mesh, gone);
-}
-
 /// Whether a patch crosses the rest of its mesh or itself.
-bool crosses(const Patch& patch, const FrameMesh& mesh) {
-    std::vector<Vec3> points = mesh.vertices;
+bool crosses(const Patch& patch, const TriangleBins& mesh) {
+    std::vector<Vec3> points = mesh.points();
     points.insert(points.end(), patch.points.begin(), patch.points.end());
-    std::vector<char> stays;
-    for (const char gone : patch.gone) stays.push_back(!gone);
-    std::vector<Triangle> rest = mesh.carved.triangles;
-    compact(rest, stays);
+    Box box;
+    for (const Triangle& t : patch.triangles) box.extend(box_of(points, t));
+    std::vector<Triangle> rest;
+    for (const int t : mesh.meeting(box))
+        if (!std::binary_search(patch.gone.begin(), patch.gone.end(), t)) rest.push_back(mesh.triangles()[t]);
     return any_cross(points, patch.triangles, rest);
-}
-
-/// The corners of the triangles of a patch, three for each.
-std::vector<Vec3> corners_of(const Patch& patch, const FrameMesh& mesh) {
-    std::vector<Vec3> result;
-    for (const Triangle& t : patch.triangles)
-        for (const int v : from_least_corner(t)) {
-            const auto number = static_cast<std::size_t>(v), old = mesh.vertices.size();
-            result.push_back(number < old ? mesh.vertices[number] : patch.points[number - old]);
-        }
-    return result;
-}
-
-/// Whether a triangle has hardly any area, as where the surface passes through a lattice node. Three corners
-/// for each.
-bool has_flat_triangle(const std::vector<Vec3>& corners) {
-    for (std::size_t c = 0; c < corners.size(); c += 3) {
-        const Vec3 a = corners[c + 1] - corners[c], b = corners[c + 2] - corners[c];
-        const double longest2 = std::max({a.squaredNorm(), b.squaredNorm(), (b - a).squaredNorm()});
-        if (!(a.cross(b).norm() > kFlat * longest2)) return true;
-    }
-    return false;
 }
 
 double area_of(const std::vector<int>& triangles, const FrameMesh& mesh) {
@@ -171,10 +125,6 @@ std::vector<Vec3> places_everywhere(const FrameMesh& mesh, double resolution) {
     if (all.size() > kMostEverywhere || area > kMostAreaOfPlace * static_cast<double>(all.size()))
         all.clear();
     return all;
-}
-
-bool is_sound(const MeshTopology& topology) {
-    return topology.closed() && topology.oriented() && topology.manifold();
 }
 
 /// What a search has tried, of all patchers that take part in it.
@@ -246,10 +196,10 @@ public:
             return false;
         }
         effort_.triangles += mesh.carved.triangles.size();
-        FrameMesh other = patched(mesh, *patch);
+        FrameMesh other = patched(mesh, {&*patch});
         const MeshTopology topology = topology_of(other);
         if (!is_sound(topology) || !are_wanted(topology)) return false;
-        if (has_flat_triangle(corners) || crosses(*patch, mesh)) return std::nullopt;
+        if (has_flat_triangle(corners) || crosses(*patch, bins)) return std::nullopt;
         if (!try_mesh(std::move(other))) {
             ++effort_.refused;
             return std::nullopt;
@@ -338,7 +288,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     bool all_have_lattice = places.size() <= kMostPlaces;  // for patches
     if (!places.empty()) {
         make_lattice(places, all_have_lattice ? kTriedReach : kLookReach);
-        std::vector<Vec3> likely = patcher->unlike(suspicious, true);
+        std::vector<Vec3> likely = patcher->unlike(suspicious, places.size() <= kMostPlaces);
         likely.insert(likely.end(), unmatched.begin(), unmatched.end());
         search(std::move(likely), all_have_lattice);
     }
@@ -370,7 +320,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
 std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface) {
     const double resolution = surface.resolution();
     std::vector<Vec3> places = apart(trials.failing_places(), kApart * resolution), around;
-    if (places.empty() || places.size() > kMostFailing) return 0;  // some less would make it no better
+    if (places.empty() || places.size() > kManyFailing) return 0;  // some less would make it no better
     const auto is_near = [&](const Vec3& place, double distance) {
         return std::any_of(places.begin(), places.end(),
                            [&](const Vec3& other) { return (other - place).norm() < distance * resolution; });

@@ -31,6 +31,7 @@
 #include "tracking/last_mesh.h"
 #include "tracking/lost_drops.h"
 #include "tracking/mesh_trials.h"
+#include "tracking/patch_batches.h"
 #include "tracking/patches.h"
 #include "tracking/refinement.h"
 #include "tracking/relabelling.h"
@@ -557,13 +558,15 @@ void Tracker::Impl::Making::patch() {
     const StageTimer timer(work_.frame.seconds, "certify");
     const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
     MeshTrials of_mesh(work_.mesh, work_.inspection, *work_.inspector, work_.limits);
+    const bool fails_much = of_mesh.failing_places().size() > kManyFailing;
+    if (fails_much) mend_in_batches(of_mesh, work_.surface);
     if (!has_topology()) {
         if (work_.inspection.topology.speck.size() != work_.mesh.carved.triangles.size())
             work_.inspector->inspect_topology(work_.mesh, work_.inspection);
         patch_topology(of_mesh, thickness, work_.surface);
     }
     work_.inspector->look_off_surface(work_.mesh, work_.inspection);
-    patch_failing(of_mesh, thickness, work_.surface);
+    if (!fails_much) patch_failing(of_mesh, thickness, work_.surface);
 }
 
 /// Brings the particles to the surface, and their number and spacing to what it wants.

@@ -2,12 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <vector>
 
 #include "isotrack/surface/shapes.h"
+#include "meshing/triangle_box.h"
 #include "support/carved.h"
 #include "surface/cell_points.h"
+#include "tracking/between_crossings.h"
+#include "tracking/facets.h"
 #include "tracking/failing.h"
 #include "tracking/inspection.h"
 
@@ -53,6 +57,60 @@ TEST(Inspector, FindsWhatIsMissedBetweenCrossingsThatAreReached) {
             EXPECT_GT(d, limit - 1e-6);
     }
     EXPECT_GT(found, 0);
+}
+
+TEST(Inspector, FindsTheSameBetweenCrossingsByWhatChanged) {
+    const auto box = shapes::box({0.01, 0.02, 0.03}, {1.0, 0.7, 0.45}, kResolution);
+    const CrossingGrid crossings(*box);
+    const Carved carved(*box, 0.04);
+    const FrameMesh mesh = carved.mesh();
+    const auto& triangles = mesh.carved.triangles;
+    constexpr double kTolerance = 0.06, kCutoff = 3.0 * kTolerance;
+    BetweenCrossings all(*box, crossings, {}, kTolerance), by_changes(*box, crossings, {}, kTolerance);
+    const auto measured = [&](const std::vector<Vec3>& vertices) {
+        MeshDistances distances(crossings, kCutoff);
+        distances.measure(vertices, triangles, {});
+        return distances;
+    };
+    const auto sorted = [](const std::vector<Surface::Crossing>& points) {
+        std::vector<std::array<double, 3>> result;
+        for (const auto& c : points) result.push_back({c.point.x(), c.point.y(), c.point.z()});
+        std::sort(result.begin(), result.end());
+        return result;
+    };
+    EXPECT_EQ(sorted(all.points(mesh.vertices, triangles, measured(mesh.vertices))),
+              sorted(by_changes.points(mesh.vertices, triangles, measured(mesh.vertices))));
+    std::size_t found = 0;
+    std::vector<Vec3> vertices = mesh.vertices;
+    for (std::size_t v = 5; v < vertices.size(); v += vertices.size() / 7) {  // one dent after the other
+        std::vector<Box> changed;
+        const auto note = [&] {
+            for (const Triangle& t : triangles)
+                if (std::find(t.begin(), t.end(), static_cast<int>(v)) != t.end())
+                    changed.push_back(box_of(vertices, t));
+        };
+        note();
+        vertices[v] *= 1.0 - 0.05 / vertices[v].norm();
+        note();
+        const MeshDistances distances = measured(vertices);
+        const auto expected = sorted(all.points(vertices, triangles, distances));
+        EXPECT_EQ(sorted(by_changes.points_near(changed, kCutoff, vertices, triangles, distances)), expected);
+        found += expected.size();
+    }
+    EXPECT_GT(found, 20u);
+}
+
+TEST(Facets, AreTheSameByTheirCornersWhereTheyHaveNoKey) {
+    const auto facet = [](float x) {
+        return Facet{-1, {Eigen::Vector3f(x, 0, 0), Eigen::Vector3f(x, 1, 0), Eigen::Vector3f(x, 0, 1)}};
+    };
+    const std::vector<Facet> came = {facet(4), facet(1), facet(3)},
+                             went = {facet(2), facet(3), facet(4), facet(5)};
+    auto same = same_corners(came, went);
+    std::sort(same.begin(), same.end());
+    const std::vector<std::array<std::size_t, 2>> expected = {{0, 2}, {2, 1}};
+    EXPECT_EQ(same, expected);
+    EXPECT_TRUE(same_corners(came, {}).empty());
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "isotrack/surface/shapes.h"
 #include "support/carved.h"
 #include "support/lattice_grid.h"
+#include "tracking/patch_batches.h"
 
 namespace isotrack {
 namespace {
@@ -75,6 +76,37 @@ openvdb::FloatGrid::Ptr thin_ring() {
     return lattice_grid({-13, -13, -6}, {13, 13, 6}, [](const Vec3& p) {
         return std::hypot(std::hypot(p.x() + 0.2, p.y() - 0.1) - 7.3, p.z() + 0.1) - 0.85;
     });
+}
+
+TEST(Patches, FillManyHolesAtOnce) {
+    const LevelSet surface(thin_disk_and_ball());
+    Carved carved(surface, 0.5, 0.8);
+    const MeshTopology whole = topology_of(carved.mesh());
+    const std::vector<Vec3> holes = {{0.5, 0.5, 0.0}, {-5.0, 0.3, 0.0}, {4.6, -2.2, 0.0}, {0.2, 5.4, 0.0}};
+    for (int c = 0; c < static_cast<int>(carved.labels.size()); ++c)
+        if (carved.labels[c] && std::any_of(holes.begin(), holes.end(), [&](const Vec3& hole) {
+                return (carved.centroid(c) - hole).norm() < 1.3;
+            }))
+            carved.labels[c] = 0;
+    FrameMesh mesh = carved.mesh();
+    ASSERT_NE(topology_of(mesh).euler, whole.euler);
+
+    Inspected now(carved, mesh);
+    const auto fails_near = [&](const Vec3& hole) {
+        const auto failing = now.trials.failing_places();
+        return std::any_of(failing.begin(), failing.end(),
+                           [&](const Vec3& place) { return (place - hole).norm() < 1.6; });
+    };
+    for (const Vec3& hole : holes) EXPECT_TRUE(fails_near(hole)) << hole.transpose();
+    const std::size_t failing_before = now.trials.failing_places().size();
+    EXPECT_GE(mend_in_batches(now.trials, surface), holes.size());
+    for (const Vec3& hole : holes) EXPECT_FALSE(fails_near(hole)) << hole.transpose();
+    EXPECT_LT(now.trials.failing_places().size(), failing_before);
+    const MeshTopology topology = topology_of(mesh);
+    EXPECT_EQ(topology.euler, whole.euler);
+    EXPECT_EQ(topology.components, whole.components);
+    expect_sound(mesh);
+    EXPECT_EQ(now.inspection.errors->size(), mesh.carved.triangles.size());
 }
 
 TEST(Patches, CloseARingThatIsCut) {
