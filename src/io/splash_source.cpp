@@ -14,7 +14,7 @@ namespace isotrack {
 namespace {
 
 constexpr int kDrops = 3000;
-constexpr double kPoolDepth = 0.15;
+constexpr double kPoolDepth = 0.1487;  // not on nodes of lattices of round numbers, where drops would touch it
 constexpr double kSmallest = 0.012, kLargest = 0.045;      // radii; most drops are small
 constexpr double kFirstLaunch = 0.02, kLastLaunch = 0.55;  // all is calm again before the end, at 1
 constexpr double kShortestFlight = 0.15, kLongestFlight = 0.42;

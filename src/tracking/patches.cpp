@@ -35,7 +35,7 @@ constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
 constexpr double kTriedReach = 24.0, kLookReach = 4.0 * kSmall;
 constexpr double kMostArea = 50000.0,
                  kMostAreaOfPlace = 50.0;  // square: what goes, for all patches, for one
-constexpr std::size_t kMostPlaces = 300;
+constexpr std::size_t kMostPlaces = 300, kMostWithLattice = 1000;
 constexpr int kMostPatches = 1000, kMostTooFar = 50, kMostRefused = 50;  // see Effort
 constexpr std::size_t kMostTriangles = 10000000;                         // of the whole meshes they make
 constexpr double kLikelyShare = 0.8;            // of patches and area, for places that are likely
@@ -197,8 +197,7 @@ public:
         }
         effort_.triangles += mesh.carved.triangles.size();
         FrameMesh other = patched(mesh, {&*patch});
-        const MeshTopology topology = topology_of(other);
-        if (!is_sound(topology) || !are_wanted(topology)) return false;
+        if (!are_wanted(numbers_of(other)) || !is_sound(topology_of(other))) return false;
         if (has_flat_triangle(corners) || crosses(*patch, bins)) return std::nullopt;
         if (!try_mesh(std::move(other))) {
             ++effort_.refused;
@@ -232,12 +231,13 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const auto count_wanted = surface.lattice_component_count();
     if (!count_wanted) return 0;
     // Components and handles that are too many or too few.
-    const auto astray = [&](const MeshTopology& topology) {
-        const long components = static_cast<long>(topology.components) - static_cast<long>(*count_wanted),
-                   handles = components - (topology.euler - *euler) / 2;
+    const auto astray = [&](const MeshNumbers& numbers) {
+        const long components = numbers.components - static_cast<long>(*count_wanted),
+                   handles = components - (numbers.euler - *euler) / 2;
         return std::abs(components) + std::abs(handles);
     };
-    long now = astray(topology_of(trials.mesh()));
+    MeshNumbers numbers = numbers_of(trials.mesh());
+    long now = astray(numbers);
     if (now == 0) return 0;
     const auto wanted = surface.lattice_components();
     if (!wanted) return 0;
@@ -248,18 +248,27 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     };
     std::size_t count = 0;
     std::set<std::array<double, 3>> around;  // vertices where a patch would be right, but did not fit
+    // Beyond a patch what it joins or parts may hang together: about so many components more or fewer.
+    const auto may_be_wanted = [&](const Patch& patch, long most) {
+        if (patch.euler == 0 && patch.components == 0) return false;
+        const long fewest = std::min(patch.components, 0L) - 1, many = std::max(patch.components, 0L) + 1;
+        for (long more = fewest; more <= many; ++more)
+            if (astray({numbers.components + more, numbers.euler + patch.euler}) <= most) return true;
+        return false;
+    };
     const auto patch_at = [&](const Vec3& place, double reach, long most) {
-        long then = 0;
+        MeshNumbers then{};
         const auto taken = patcher->patch_at(
-            place, reach, [](const Patch& patch) { return patch.euler != 0 || patch.components != 0; },
-            [&](const MeshTopology& topology) { return (then = astray(topology)) <= most; },
+            place, reach, [&](const Patch& patch) { return may_be_wanted(patch, most); },
+            [&](const MeshNumbers& of_other) { return astray(then = of_other) <= most; },
             [&](FrameMesh other) { return trials.try_mesh(std::move(other)); });
         if (!taken) {
             for (const Vec3& v : trials.mesh().vertices)
                 if ((v - place).norm() < reach * resolution) around.insert({v.x(), v.y(), v.z()});
         } else if (*taken) {
             ++count;
-            now = then;
+            numbers = then;
+            now = astray(numbers);
         }
     };
     double share = kLikelyShare;  // of the effort
@@ -285,7 +294,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const std::vector<Vec3> suspicious = places,
                             unmatched = unmatched_components(trials.mesh(), *wanted, resolution);
     places.insert(places.end(), unmatched.begin(), unmatched.end());
-    bool all_have_lattice = places.size() <= kMostPlaces;  // for patches
+    bool all_have_lattice = places.size() <= kMostWithLattice;  // for patches
     if (!places.empty()) {
         make_lattice(places, all_have_lattice ? kTriedReach : kLookReach);
         std::vector<Vec3> likely = patcher->unlike(suspicious, places.size() <= kMostPlaces);
@@ -336,27 +345,26 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
         return std::any_of(failing.begin(), failing.end(),
                            [&](const Vec3& other) { return (other - place).norm() < distance * resolution; });
     };
-    const MeshTopology topology = topology_of(trials.mesh());
-    const auto has_same_numbers = [&](const MeshTopology& other) {
-        return other.components == topology.components && other.euler == topology.euler;
-    };
+    const MeshNumbers numbers = numbers_of(trials.mesh());
     Effort effort;
     Patcher patcher(trials, places, kTriedReach, surface, effort);
     std::size_t count = 0;
-    const auto patch_at = [&](const Vec3& place, double reach, const auto& are_wanted) {
+    const auto patch_at = [&](const Vec3& place, double reach, const auto& is_wanted,
+                              const auto& are_wanted) {
         return patcher
-            .patch_at(
-                place, reach, [](const Patch&) { return true; }, are_wanted,
-                [&](FrameMesh other) { return trials.try_to_mend(std::move(other)); })
+            .patch_at(place, reach, is_wanted, are_wanted,
+                      [&](FrameMesh other) { return trials.try_to_mend(std::move(other)); })
             .value_or(false);
     };
     // Whether then another patch elsewhere brings the numbers back: the mesh had two faults that hid each
     // other.
     const auto patch_twice = [&](const Vec3& place, double reach) {
         FrameMesh before = trials.mesh();
-        if (!patch_at(place, reach, [](const MeshTopology&) { return true; })) return false;
+        if (!patch_at(
+                place, reach, [](const Patch&) { return true; }, [](const MeshNumbers&) { return true; }))
+            return false;
         patch_topology(trials, thickness, surface, effort);
-        const bool good = has_same_numbers(topology_of(trials.mesh()));
+        const bool good = numbers_of(trials.mesh()) == numbers;
         if (!good) {
             trials.put_back(std::move(before));
             ++effort.refused;
@@ -374,7 +382,9 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
         patcher.try_again();
     };
     const auto patch_alone = [&](const Vec3& place, double reach) {
-        return patch_at(place, reach, has_same_numbers);
+        return patch_at(
+            place, reach, [](const Patch& patch) { return patch.euler == 0; },
+            [&](const MeshNumbers& of_other) { return of_other == numbers; });
     };
     patch_near(places, kApart, patch_alone);
     for (const Vec3& v : trials.mesh().vertices)

@@ -4,6 +4,7 @@
 #include <array>
 #include <map>
 
+#include "disjoint_sets.h"
 #include "tracking/triangle_index.h"
 
 namespace isotrack {
@@ -63,6 +64,14 @@ bool has_flat_triangle(const std::vector<Vec3>& corners) {
         if (!(a.cross(b).norm() > kFlat * longest2)) return true;
     }
     return false;
+}
+
+MeshNumbers numbers_of(const FrameMesh& mesh) {
+    DisjointSets sets(mesh.vertices.size());
+    long components = static_cast<long>(mesh.vertices.size());
+    for (const Triangle& t : mesh.carved.triangles)
+        for (const int v : {t[1], t[2]}) components -= sets.join(t[0], v);
+    return {components, euler_of(mesh)};
 }
 
 }  // namespace isotrack
