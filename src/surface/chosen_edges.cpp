@@ -76,7 +76,7 @@ public:
     }
     /// It is flat if all are between two such planes that are close together, and is no part of a drop.
     void judge(int wide) {
-        constexpr double kThickness = 0.16, kLeastSpread = 0.5;  // of the cube's edge
+        constexpr double kThickness = 0.16, kLeastSpread = 1.0;  // of the cube's edge
         flat_ = fits_ && high_ - low_ <= kThickness * wide * normal_.norm() &&
                 std::max(corner_[0] + corner_[2], corner_[1] + corner_[3]) >= kLeastSpread * wide;
     }
@@ -200,6 +200,7 @@ std::vector<StandIn> thin_out(const CrossedEdges& crossed, int cube, int wide) {
                 for_each_edge(crossed.parts[part],
                               [&](std::size_t e, const Coord& in_leaf, const FlatCube& around) {
                                   if (around.is_flat()) return;
+                                  if (cube == 1) return found.push_back({e, 1, false});
                                   if (!any_other) std::fill(cubes.begin(), cubes.end(), AnyCube());
                                   any_other = true;
                                   cubes[number_of(in_leaf, cube)].take(e, crossed.edges[e]);

@@ -9,8 +9,12 @@ constexpr double kProjectionError = 1e-4;  // voxels; float values carry no more
 
 }  // namespace
 
-GridProbe::GridProbe(const openvdb::FloatTree& tree, const AffineMap& map, double band)
-    : Probe(kProjectionError * map.voxel_size, map.voxel_size), map_(map), stencil_(tree), band_(band) {}
+GridProbe::GridProbe(const openvdb::FloatTree& tree, const LeafTable& table, const AffineMap& map,
+                     double band)
+    : Probe(kProjectionError * map.voxel_size, map.voxel_size),
+      map_(map),
+      stencil_(tree, &table),
+      band_(band) {}
 
 double GridProbe::farther_value(const Vec3& p) {
     const double value = stencil_.value(map_.to_index(p)).farther;

@@ -11,8 +11,9 @@ namespace isotrack {
 
 class GridProbe final : public Surface::Probe {
 public:
-    /// `band`: the half width of the grid's band, world units. The tree and the map must outlive the probe.
-    GridProbe(const openvdb::FloatTree& tree, const AffineMap& map, double band);
+    /// `table`: of the tree. `band`: the half width of the grid's band, world units. All else must outlive
+    /// the probe.
+    GridProbe(const openvdb::FloatTree& tree, const LeafTable& table, const AffineMap& map, double band);
 
     double value(const Vec3& p) override { return stencil_.value(map_.to_index(p)).joined; }
     double farther_value(const Vec3& p) override;

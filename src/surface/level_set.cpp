@@ -101,6 +101,7 @@ struct LevelSet::Impl {
     std::size_t active_voxels = 0, border_crossings = 0;
     openvdb::GridBase::ConstPtr source;  // as it came
     CrossedEdges crossed;
+    LeafTable leaves;
     Box bounds;
 
     Impl(const openvdb::GridBase::ConstPtr& as_it_came, const LevelSetOptions& options)
@@ -159,6 +160,7 @@ struct LevelSet::Impl {
         band = map.voxel_size * std::clamp(std::min<double>(grid->background(), inside) / map.voxel_size,
                                            kLeastBand, kFarVoxels);
         crossed = std::move(found);
+        leaves = LeafTable(grid->constTree());
         bounds = tbb::parallel_reduce(
             tbb::blocked_range<std::size_t>(0, crossed.edges.size(), 4096), Box(),
             [&](const auto& range, Box box) {
@@ -242,7 +244,7 @@ LevelSet::LevelSet(openvdb::GridBase::ConstPtr grid, const LevelSetOptions& opti
 LevelSet::~LevelSet() = default;
 
 std::unique_ptr<Surface::Probe> LevelSet::probe() const {
-    return std::make_unique<GridProbe>(impl_->grid->constTree(), impl_->map, impl_->band);
+    return std::make_unique<GridProbe>(impl_->grid->constTree(), impl_->leaves, impl_->map, impl_->band);
 }
 double LevelSet::resolution() const {
     return impl_->map.voxel_size;
@@ -304,9 +306,11 @@ Surface::CrossingSequence LevelSet::crossing_sequence(double apart) const {
     constexpr int kWidest = 64;     // voxels
     const UnsetVector<CrossedEdge>& edges = impl_->crossed.edges;
     const ToCrossing crossing(impl_->map);
-    if (const int cube = cube_within(apart, resolution()); cube > 1) {
-        std::vector<StandIn> some =
-            thin_out(impl_->crossed, cube, cube_within(kFlat * apart, resolution(), kWidest));
+    constexpr int kLeastWide = 4;  // in less there is nothing to leave out
+    const int cube = cube_within(apart, resolution()),
+              wide = cube_within(kFlat * apart, resolution(), kWidest);
+    if (wide >= kLeastWide) {
+        std::vector<StandIn> some = thin_out(impl_->crossed, cube, wide);
         const std::size_t size = some.size();
         return {size, [&edges, crossing, chosen = std::move(some)](std::size_t i) {
                     Crossing result = crossing(edges[chosen[i].edge]);
@@ -393,8 +397,8 @@ TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reac
 
 std::vector<Surface::Diagonal> LevelSet::diagonals() const {
     return gather<Diagonal>(impl_->crossed.edges, [this] {
-        return [this, nodes = NodeValues(impl_->grid->constTree())](const CrossedEdge& edge,
-                                                                    std::vector<Diagonal>& found) mutable {
+        return [this, nodes = NodeValues(impl_->grid->constTree(), &impl_->leaves)](
+                   const CrossedEdge& edge, std::vector<Diagonal>& found) mutable {
             for (int other = edge.axis + 1; other < 3; ++other)
                 if ((edge.saddles >> other & 1) != 0)
                     if (const auto diagonal = diagonal_beyond(edge, other, nodes, impl_->map))

@@ -8,7 +8,9 @@ namespace isotrack {
 
 void NodeValues::fetch(const Coord& node, const Coord& at, Place& place) {
     place.leaf = at;
-    if (const Leaf* found = leaves_.probeConstLeaf(node)) {
+    if (const float* known = table_ ? table_->values_of(at) : nullptr) {
+        place.values = known;
+    } else if (const Leaf* found = leaves_.probeConstLeaf(node)) {
         place.values = found->buffer().data();
     } else if (const float value = leaves_.getValue(node); value == far_[value < 0.0f][0]) {
         place.values = far_[value < 0.0f];

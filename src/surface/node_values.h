@@ -7,6 +7,8 @@
 #include <cstring>
 #include <memory>
 
+#include "surface/leaf_table.h"
+
 namespace isotrack {
 
 /// Values at lattice nodes, through the leaves met lately: neighbouring leaves have places of their own.
@@ -16,7 +18,9 @@ class NodeValues {
     static constexpr int kLeafDim = Leaf::DIM, kMask = kLeafDim - 1;
 
 public:
-    explicit NodeValues(const openvdb::FloatTree& tree) : leaves_(tree) {
+    /// `table`: of the tree, if there is one. Both must outlive it.
+    explicit NodeValues(const openvdb::FloatTree& tree, const LeafTable* table = nullptr)
+        : table_(table), leaves_(tree) {
         const float outside = tree.background();
         std::fill_n(far_[0], Leaf::SIZE, outside);
         std::fill_n(far_[1], Leaf::SIZE, -outside);
@@ -80,6 +84,7 @@ private:
     const float* meet(const float*& known, const Coord& node);
     static int offset(int x, int y) { return (x * kLeafDim + y) * kLeafDim; }
 
+    const LeafTable* table_;
     openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> leaves_;  // one thread's, not registered
     Place places_[64];
     float far_[2][Leaf::SIZE];  // values of most tiles, outside and inside

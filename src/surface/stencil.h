@@ -15,7 +15,8 @@ namespace isotrack {
 /// are those that the central differences at the corners need.
 class Stencil {
 public:
-    explicit Stencil(const openvdb::FloatTree& tree) : nodes_(tree) {}
+    explicit Stencil(const openvdb::FloatTree& tree, const LeafTable* table = nullptr)
+        : nodes_(tree, table) {}
 
     /// Of an ambiguous cell also without what joins its nodes, where that is farther on the same side, by up
     /// to twice.
