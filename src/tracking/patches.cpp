@@ -303,16 +303,15 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     }
     share = 1.0;
     if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true)) {
-        std::vector<Vec3> others;
-        if (now <= kMostAstray) others = places_everywhere(trials.mesh(), resolution);
-        const bool everywhere = !others.empty();
-        if (everywhere) {
+        // Where something small is, which takes a tenth of the time, then everywhere.
+        for (const bool everywhere : {false, true}) {
+            if (now == 0 || (everywhere && now > kMostAstray)) break;
+            std::vector<Vec3> others = everywhere ? places_everywhere(trials.mesh(), resolution)
+                                                  : other_places(trials.mesh(), surface);
+            if (others.empty()) continue;
             make_lattice(others, kTriedReach);
-            others = patcher->unlike(others, false);
-        } else {
-            others = other_places(trials.mesh(), surface);
+            search(patcher->unlike(others, false), true);
         }
-        search(std::move(others), everywhere);
         all_have_lattice = false;
     }
     search(places, all_have_lattice);
