@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <optional>
 #include <utility>
 
 #include "find_in_blocks.h"
@@ -18,7 +17,6 @@ constexpr int kBits = 21;  // of a cell's coordinate
 constexpr double kHalfRange = 1 << (kBits - 1);
 constexpr double kAtNode = 1e-4;    // of an edge
 constexpr float kLeastWay = 0.01f;  // of a sum of unit vectors
-constexpr double kHalfCell = 0.6;   // resolutions, and some room for rounding
 
 std::uint64_t packed(const Vec3& cell) {
     std::uint64_t result = 0;
@@ -155,10 +153,10 @@ private:
 
 }  // namespace
 
-CellPoints::CellPoints(const CrossingGrid& crossings, const Surface& surface,
+CellPoints::CellPoints(const CrossingGrid& crossings, const Eigen::Affine3d& lattice,
                        const std::vector<Surface::Diagonal>& diagonals)
-    : crossings_(crossings), surface_(surface), lattice_(surface.lattice()) {
-    const Eigen::Affine3d to_lattice = lattice_.inverse();
+    : crossings_(crossings), lattice_(lattice) {
+    const Eigen::Affine3d to_lattice = lattice.inverse();
     for (const Surface::Diagonal& d : diagonals) {
         const Vec3 nodes[2] = {(to_lattice * d.from).array().round(), (to_lattice * d.to).array().round()};
         int across = 0;
@@ -202,23 +200,14 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
 
     constexpr double kRounding = 0.01;
     const Vec3 half = 0.5 * (1.0 + kRounding) * lattice_.linear().cwiseAbs().rowwise().sum();
-    std::optional<CrossingGrid> around_cells;  // all, where some of the surface's stand for others
-    if (!crossings_.complete()) {
-        std::vector<Vec3> middles;
-        for (const std::uint64_t cell : fresh)
-            middles.push_back(lattice_ * (unpacked(cell).array() + 0.5).matrix());
-        around_cells.emplace(surface_.crossings_near(middles, kHalfCell * surface_.resolution()),
-                             surface_.resolution());
-    }
-    const CrossingGrid& crossings = around_cells ? *around_cells : crossings_;
     return find_in_blocks<Surface::Crossing>(
         fresh.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<Surface::Crossing>& found) {
             Cell cell;
             for (std::size_t i = begin; i < end; ++i) {
                 const Vec3 origin = unpacked(fresh[i]), middle = lattice_ * (origin.array() + 0.5).matrix();
                 cell.clear();
-                crossings.for_each_in(Box(middle - half, middle + half), [&](std::size_t c) {
-                    const Surface::Crossing crossing = crossings[c];
+                crossings_.for_each_in(Box(middle - half, middle + half), [&](std::size_t c) {
+                    const Surface::Crossing crossing = crossings_[c];
                     const auto [low, axis, upward] = edges.edge_of(crossing);
                     const Vec3 from = low - origin;
                     if (from[axis] != 0.0 || from.minCoeff() < 0.0 || from.maxCoeff() > 1.0) return;

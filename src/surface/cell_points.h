@@ -10,8 +10,9 @@ namespace isotrack {
 
 class CellPoints {
 public:
-    /// `crossings`: those of the surface. Both must outlive it. `diagonals`: all of the surface.
-    CellPoints(const CrossingGrid& crossings, const Surface& surface,
+    /// `crossings`: all of `lattice`, none that stands for others. They must outlive it. `diagonals`: all of
+    /// the surface.
+    CellPoints(const CrossingGrid& crossings, const Eigen::Affine3d& lattice,
                const std::vector<Surface::Diagonal>& diagonals);
 
     /// In the cells around the edges that some crossings are on, and in all with an ambiguous face: for each
@@ -28,7 +29,6 @@ private:
     };
 
     const CrossingGrid& crossings_;
-    const Surface& surface_;
     const Eigen::Affine3d lattice_;
     std::vector<Join> joins_;           // by cell
     std::vector<std::uint64_t> given_;  // packed cells, ascending

@@ -8,7 +8,6 @@
 #include <limits>
 #include <map>
 #include <numeric>
-#include <optional>
 #include <utility>
 
 #include "find_in_blocks.h"
@@ -19,7 +18,6 @@ using openvdb::Coord;
 
 namespace {
 
-constexpr int kEdgeAllMeasured = 4;  // voxels: of a cube where all of few edges tell which way it faces
 constexpr int kDim = openvdb::FloatTree::LeafNodeType::DIM;
 
 /// Which of the cubes of a leaf holds a node, or is next to one that is just below the leaf.
@@ -32,81 +30,55 @@ std::size_t number_of(const Coord& in_leaf, int cube) {
 constexpr std::size_t kNone = ~std::size_t{0};
 
 /// The edges of a cube, where the surface may be a flat sheet.
-class FlatCube {
-public:
-    static int direction(const CrossedEdge& edge) { return 2 * edge.axis + edge.outward; }
+struct FlatCube {
+    int count[6] = {};           // of edges in each direction
+    bool goes_one_way = false;   // along each axis
+    Vec3 normal = Vec3::Zero();  // the sum of the directions
+    int axis = 0;                // that it is nearest to
+    // Of them all the lowest and the highest, as the surface faces there, and its corners: the farthest along
+    // the diagonals of the two axes that it is nearest to.
+    double low = kFar, high = -kFar;
+    double corner[4] = {-kFar, -kFar, -kFar, -kFar};
+    std::size_t at_corner[4] = {kNone, kNone, kNone, kNone};
+    bool flat = false;
 
-    /// All edges first.
-    void count(const CrossedEdge& edge) { ++count_[direction(edge)]; }
-    /// And the places of some, from a corner of the cube on: rounding is no matter then.
-    void measure(const Vec3& place) {
-        ++measured_;
-        sum_ += place;
-        squares_ += place * place.transpose();
+    static constexpr double kFar = std::numeric_limits<double>::infinity();
+    static int direction(const CrossedEdge& edge) { return 2 * edge.axis + edge.outward; }
+    int size() const { return std::accumulate(count, count + 6, 0); }
+    /// All edges are counted by now.
+    void take_counts() {
+        goes_one_way = (count[0] == 0 || count[1] == 0) && (count[2] == 0 || count[3] == 0) &&
+                       (count[4] == 0 || count[5] == 0);
+        normal = Vec3(count[1] - count[0], count[3] - count[2], count[5] - count[4]);
+        normal.cwiseAbs().maxCoeff(&axis);
     }
-    /// The plane that fits them best, by its height over the two axes that it is nearest to. None where edges
-    /// go both ways across it, as those of two sheets, or where they do not tell.
-    void fit_plane() {
-        if (measured_ == 0) return;
-        const Mat3 moments = squares_ - sum_ * sum_.transpose() / measured_;
-        const Vec3 outward(count_[1] - count_[0], count_[3] - count_[2], count_[5] - count_[4]);
-        outward.cwiseAbs().maxCoeff(&axis_);
-        const int u = (axis_ + 1) % 3, v = (axis_ + 2) % 3;
-        const double determinant = moments(u, u) * moments(v, v) - moments(u, v) * moments(u, v);
-        fits_ = (count_[2 * axis_] == 0 || count_[2 * axis_ + 1] == 0) &&
-                determinant > kLeastDeterminant * moments(u, u) * moments(v, v);
-        if (!fits_) return;
-        normal_[axis_] = 1.0;
-        normal_[u] = (moments(u, v) * moments(v, axis_) - moments(v, v) * moments(u, axis_)) / determinant;
-        normal_[v] = (moments(u, v) * moments(u, axis_) - moments(u, u) * moments(v, axis_)) / determinant;
-    }
-    bool fits() const { return fits_; }
-    /// Then all again, if there is such a plane.
-    void take_place(std::size_t number, const Vec3& place) {
-        const double height = normal_.dot(place);
-        low_ = std::min(low_, height);
-        high_ = std::max(high_, height);
-        const double u = place[(axis_ + 1) % 3], v = place[(axis_ + 2) % 3];
+    void take_place(std::size_t number, const CrossedEdge& edge) {
+        const Vec3 p = edge.index();
+        const double height = normal.dot(p);
+        low = std::min(low, height);
+        high = std::max(high, height);
+        const double u = p[(axis + 1) % 3], v = p[(axis + 2) % 3];
         const double along[4] = {u + v, u - v, -u - v, v - u};
         for (int k = 0; k < 4; ++k) {
-            if (!(along[k] > corner_[k])) continue;
-            corner_[k] = along[k];
-            at_corner_[k] = number;
+            if (!(along[k] > corner[k])) continue;
+            corner[k] = along[k];
+            at_corner[k] = number;
         }
     }
-    /// It is flat if all are between two such planes that are close together, and is no part of a drop.
+    /// It is flat if it goes one way between two planes that are close together, and is no part of a drop.
     void judge(int wide) {
-        constexpr double kThickness = 0.16, kLeastSpread = 1.0;  // of the cube's edge
-        flat_ = fits_ && high_ - low_ <= kThickness * wide * normal_.norm() &&
-                std::max(corner_[0] + corner_[2], corner_[1] + corner_[3]) >= kLeastSpread * wide;
+        constexpr double kThickness = 0.16, kLeastSpread = 0.5;  // of the cube's edge
+        flat = goes_one_way && high - low <= kThickness * wide * normal.norm() &&
+               std::max(corner[0] + corner[2], corner[1] + corner[3]) >= kLeastSpread * wide;
     }
-    bool is_flat() const { return flat_; }
     void choose(std::vector<StandIn>& found) const {
-        if (!flat_) return;
-        std::array<std::size_t, 4> some{at_corner_[0], at_corner_[1], at_corner_[2], at_corner_[3]};
+        if (!flat) return;
+        std::array<std::size_t, 4> some{at_corner[0], at_corner[1], at_corner[2], at_corner[3]};
         std::sort(some.begin(), some.end());
         const auto end = std::unique(some.begin(), some.end());
         const int chosen = static_cast<int>(end - some.begin());
         for (int k = 0; k < chosen; ++k) found.push_back({some[k], (size() + k) / chosen, true});
     }
-
-private:
-    int size() const { return std::accumulate(count_, count_ + 6, 0); }
-
-    static constexpr double kFar = std::numeric_limits<double>::infinity();
-    static constexpr double kLeastDeterminant = 1e-3;  // of what it would be of independent coordinates
-    int count_[6] = {};                                // of edges in each direction
-    int measured_ = 0;
-    Vec3 sum_ = Vec3::Zero();  // of measured places
-    Mat3 squares_ = Mat3::Zero();
-    bool fits_ = false, flat_ = false;
-    int axis_ = 0;  // that the plane's normal is nearest to
-    Vec3 normal_ = Vec3::Zero();
-    // Of all the lowest and the highest, as the plane faces, and its corners: the farthest along the
-    // diagonals of the other two axes.
-    double low_ = kFar, high_ = -kFar;
-    double corner_[4] = {-kFar, -kFar, -kFar, -kFar};
-    std::size_t at_corner_[4] = {kNone, kNone, kNone, kNone};
 };
 
 /// The edges of a cube of a leaf, whatever they are like.
@@ -162,7 +134,6 @@ std::vector<StandIn> thin_out(const CrossedEdges& crossed, int cube, int wide) {
         return static_cast<std::size_t>(size < kDim ? std::pow(kDim / size, 3) : 1);
     };
     const PartsInCubes parts(crossed.parts, wide);
-    const auto measured = static_cast<std::size_t>(std::max(1, wide / kEdgeAllMeasured));  // one of so many
     const auto find = [&](std::size_t begin, std::size_t end, std::vector<StandIn>& found) {
         std::vector<FlatCube> wide_cubes(cubes_of_leaf(wide));
         std::vector<AnyCube> cubes(cubes_of_leaf(cube));
@@ -173,25 +144,16 @@ std::vector<StandIn> thin_out(const CrossedEdges& crossed, int cube, int wide) {
                     visit(e, in_leaf, wide_cubes[wide < kDim ? number_of(in_leaf, wide) : 0]);
                 }
             };
-            // From the first leaf of the cube on.
-            std::optional<Coord> origin;
-            const auto place_of = [&](std::size_t e) {
-                CrossedEdge edge = crossed.edges[e];
-                edge.from -= *origin;
-                return edge.index();
-            };
             std::fill(wide_cubes.begin(), wide_cubes.end(), FlatCube());
             parts.for_each_in(n, [&](std::size_t part) {
-                if (!origin) origin = crossed.parts[part].origin;
                 for_each_edge(crossed.parts[part], [&](std::size_t e, const Coord&, FlatCube& around) {
-                    around.count(crossed.edges[e]);
-                    if (e % measured == 0) around.measure(place_of(e));
+                    ++around.count[FlatCube::direction(crossed.edges[e])];
                 });
             });
-            for (FlatCube& c : wide_cubes) c.fit_plane();
+            for (FlatCube& c : wide_cubes) c.take_counts();
             parts.for_each_in(n, [&](std::size_t part) {
                 for_each_edge(crossed.parts[part], [&](std::size_t e, const Coord&, FlatCube& around) {
-                    if (around.fits()) around.take_place(e, place_of(e));
+                    if (around.goes_one_way) around.take_place(e, crossed.edges[e]);
                 });
             });
             for (FlatCube& c : wide_cubes) c.judge(wide);
@@ -199,8 +161,7 @@ std::vector<StandIn> thin_out(const CrossedEdges& crossed, int cube, int wide) {
                 bool any_other = false;
                 for_each_edge(crossed.parts[part],
                               [&](std::size_t e, const Coord& in_leaf, const FlatCube& around) {
-                                  if (around.is_flat()) return;
-                                  if (cube == 1) return found.push_back({e, 1, false});
+                                  if (around.flat) return;
                                   if (!any_other) std::fill(cubes.begin(), cubes.end(), AnyCube());
                                   any_other = true;
                                   cubes[number_of(in_leaf, cube)].take(e, crossed.edges[e]);

@@ -15,11 +15,10 @@ struct StandIn {
     bool flat;         ///< The surface is a flat sheet there.
 };
 
-/// Some that stand for all. In each cube of `wide` voxels where the surface lies between two planes 0.16 of
-/// its edge apart, is no cap of a drop smaller than the cube, and edges go one way along the axis that is
-/// most across it, so that there is no rim and no second sheet: those at its four corners. Elsewhere in each
-/// cube of `cube` voxels, along the axis that most of its edges follow, one that goes out and one that goes
-/// in, or all where that is a voxel. Both are powers of two, `cube` at most 8, `wide` no less.
+/// Some that stand for all. In each cube of `wide` voxels where the edges go one way along each axis, so that
+/// there is no rim and no second sheet, and the surface lies between two planes 0.16 of its edge apart: those
+/// at its four corners. Elsewhere in each cube of `cube` voxels, along the axis that most of its edges
+/// follow, one that goes out and one that goes in. Both are powers of two, `cube` at most 8, `wide` no less.
 std::vector<StandIn> thin_out(const CrossedEdges& crossed, int cube, int wide);
 
 /// Indices of all in those of the cubes that boxes around some places meet, `reach` to each side. In voxels.

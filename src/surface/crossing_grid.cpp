@@ -85,7 +85,6 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, const Surface::Crossi
     for (const Eigen::Vector3f& direction : directions.all())
         sorted.push_back(static_cast<std::uint32_t>(
             std::find(directions_.begin(), directions_.end(), direction) - directions_.begin()));
-    complete_ = std::all_of(made.begin(), made.end(), [](const Entry& e) { return e.stands_for == 1; });
     entries_.resize(crossings.size);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c) {

@@ -306,11 +306,9 @@ Surface::CrossingSequence LevelSet::crossing_sequence(double apart) const {
     constexpr int kWidest = 64;     // voxels
     const UnsetVector<CrossedEdge>& edges = impl_->crossed.edges;
     const ToCrossing crossing(impl_->map);
-    constexpr int kLeastWide = 4;  // in less there is nothing to leave out
-    const int cube = cube_within(apart, resolution()),
-              wide = cube_within(kFlat * apart, resolution(), kWidest);
-    if (wide >= kLeastWide) {
-        std::vector<StandIn> some = thin_out(impl_->crossed, cube, wide);
+    if (const int cube = cube_within(apart, resolution()); cube > 1) {
+        std::vector<StandIn> some =
+            thin_out(impl_->crossed, cube, cube_within(kFlat * apart, resolution(), kWidest));
         const std::size_t size = some.size();
         return {size, [&edges, crossing, chosen = std::move(some)](std::size_t i) {
                     Crossing result = crossing(edges[chosen[i].edge]);

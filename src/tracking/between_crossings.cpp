@@ -86,20 +86,15 @@ bool BetweenCrossings::take_doubtful(std::size_t crossing, const MeshDistances& 
 }
 
 std::vector<Surface::Crossing> BetweenCrossings::points_beside(const std::vector<int>& doubtful) {
-    std::vector<int> alone;       // that stand for themselves
-    std::vector<Vec3> places[2];  // of the others: where the surface is not flat, and where it is
-    for (const int c : doubtful) {
-        const Surface::Crossing crossing = crossings_[c];
-        if (crossing.flat || crossings_.thinned_out(surface_))
-            places[crossing.flat].push_back(crossing.point);
-        else
-            alone.push_back(c);
-    }
+    if (!crossings_.thinned_out(surface_)) return cells_.around(doubtful);
     std::vector<Surface::Crossing> result;
-    if (!crossings_.thinned_out(surface_)) result = cells_.around(alone);
     for (const bool flat : {false, true}) {
+        std::vector<Vec3> places;
+        for (const int c : doubtful)
+            if (const Surface::Crossing crossing = crossings_[c]; crossing.flat == flat)
+                places.push_back(crossing.point);
         const double within = flat ? kStandsForOnFlat : kStandsForWithin;
-        const auto near = surface_.crossings_near(places[flat], within * crossings_.spacing());
+        const auto near = surface_.crossings_near(places, within * crossings_.spacing());
         result.insert(result.end(), near.begin(), near.end());
     }
     return result;

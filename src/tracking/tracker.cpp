@@ -54,7 +54,7 @@ struct Pace {
     double thinning;
     int sweeps;
 };
-constexpr Pace kAtFirst{{}, 0.3, 3}, kDenseAtFirst{{}, 0.3, 7};
+constexpr Pace kAtFirst{{}, 0.3, 5}, kDenseAtFirst{{}, 0.3, 7};
 // What the mesh can do without goes sooner; where it is too coarse certify finds better places.
 constexpr Pace kFollowing{{0.7, 1.1}, 0.3, 3};
 constexpr double kThinned = 0.85;      // of the tolerance: error of triangles that close the gap of a death

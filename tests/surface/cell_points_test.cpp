@@ -6,8 +6,6 @@
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include <algorithm>
-#include <array>
-#include <map>
 #include <numeric>
 #include <optional>
 #include <random>
@@ -44,7 +42,7 @@ TEST_P(Solids, HaveThemWhereTheDualMeshHasItsVertices) {
     std::vector<openvdb::Vec3s> vertices;
     std::vector<openvdb::Vec4I> quads;
     openvdb::tools::volumeToMesh(*surface->grid(), vertices, quads);
-    const auto points = CellPoints(*crossings, *surface, surface->diagonals()).around(all);
+    const auto points = CellPoints(*crossings, surface->lattice(), surface->diagonals()).around(all);
     const CrossingGrid grid(points, kVoxel);
     const auto has_node_just_inside = [&](const Vec3& vertex) {
         const Vec3 low = (surface->lattice().inverse() * vertex).array().floor();
@@ -93,7 +91,7 @@ TEST(CellPoints, AreTheVerticesOfVolumeToMeshAtAmbiguousFaces) {
     const CrossingGrid crossings(surface);
     std::vector<int> all(crossings.size());
     std::iota(all.begin(), all.end(), 0);
-    const auto points = CellPoints(crossings, surface, surface.diagonals()).around(all);
+    const auto points = CellPoints(crossings, surface.lattice(), surface.diagonals()).around(all);
     EXPECT_EQ(points.size(), vertices.size());
     const CrossingGrid found(points, 1.0);
     for (const openvdb::Vec3s& v : vertices) {
@@ -105,45 +103,17 @@ TEST(CellPoints, AreTheVerticesOfVolumeToMeshAtAmbiguousFaces) {
 }
 
 TEST_P(Solids, HaveEachOfThemOnce) {
-    CellPoints cells(*crossings, *surface, surface->diagonals());
+    CellPoints cells(*crossings, surface->lattice(), surface->diagonals());
     const std::vector<int> some(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 3));
     const std::size_t at_first = cells.around(some).size(), then = cells.around(all).size();
     EXPECT_GT(at_first, some.size() / 3);
     EXPECT_GT(then, 0u);
     EXPECT_TRUE(cells.around(all).empty());
-    EXPECT_EQ(at_first + then, CellPoints(*crossings, *surface, surface->diagonals()).around(all).size());
+    EXPECT_EQ(at_first + then,
+              CellPoints(*crossings, surface->lattice(), surface->diagonals()).around(all).size());
 }
 
 INSTANTIATE_TEST_SUITE_P(Places, Solids, ::testing::Values(0.0, 0.0221, 0.0137));
-
-TEST(CellPoints, AreTheSameWhereCrossingsNearbyStandForOthers) {
-    const double h = 0.02;
-    const LevelSet surface(rasterise(*shapes::box({0.003, 0.001, 0.002}, {0.4, 0.3, 0.2}, h), h));
-    const CrossingGrid all(surface), some(surface, 1.001 * h);
-    ASSERT_TRUE(all.complete());
-    ASSERT_FALSE(some.complete());
-    std::vector<int> alone, same;  // in either
-    const auto place = [](const Surface::Crossing& c) {
-        return std::array{c.point.x(), c.point.y(), c.point.z()};
-    };
-    std::map<std::array<double, 3>, int> number;
-    for (std::size_t i = 0; i < all.size(); ++i) number[place(all[i])] = static_cast<int>(i);
-    for (std::size_t i = 0; i < some.size(); ++i) {
-        if (some[i].flat) continue;
-        alone.push_back(static_cast<int>(i));
-        same.push_back(number.at(place(some[i])));
-    }
-    ASSERT_GT(alone.size(), 100u);
-    const auto points = [&](const CrossingGrid& crossings, const std::vector<int>& around) {
-        std::vector<Vec3> result;
-        for (const auto& c : CellPoints(crossings, surface, surface.diagonals()).around(around))
-            result.push_back(c.point);
-        return result;
-    };
-    const auto expected = points(all, same), found = points(some, alone);
-    ASSERT_EQ(found.size(), expected.size());
-    for (std::size_t i = 0; i < found.size(); ++i) EXPECT_LT((found[i] - expected[i]).norm(), 1e-6 * h);
-}
 
 }  // namespace
 }  // namespace isotrack

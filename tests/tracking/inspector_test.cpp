@@ -29,7 +29,8 @@ TEST(Inspector, FindsWhatIsMissedBetweenCrossingsThatAreReached) {
     const CrossingGrid crossings(*box);
     std::vector<int> all(crossings.size());
     std::iota(all.begin(), all.end(), 0);
-    const CrossingGrid cells(CellPoints(crossings, *box, box->diagonals()).around(all), kResolution);
+    const CrossingGrid cells(CellPoints(crossings, box->lattice(), box->diagonals()).around(all),
+                             kResolution);
     Carved carved(*box, 1.0);
     const FrameMesh mesh = carved.mesh();
     int found = 0;

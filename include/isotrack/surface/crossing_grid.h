@@ -31,9 +31,7 @@ public:
                 e.flat != 0};
     }
     double spacing() const { return spacing_; }
-    /// Whether none stands for others.
-    bool complete() const { return complete_; }
-    /// Whether some of a surface's crossings stand for all, everywhere.
+    /// Whether some of a surface's crossings stand for all.
     bool thinned_out(const Surface& surface) const { return spacing_ >= 2.0 * surface.resolution(); }
 
     /// Calls `visit` with the index of every crossing in `box`; of those in columns that are set only, if
@@ -93,7 +91,6 @@ private:
     std::vector<Eigen::Vector3f> directions_;  // those of a lattice: few
     std::vector<std::size_t> first_;           // of each column, and the end
     Vec3 origin_ = Vec3::Zero();
-    bool complete_ = true;
     double spacing_, width_;  // of the columns: wider where there would be many more than crossings
     int count_[2] = {1, 1};
 };
