@@ -118,15 +118,28 @@ std::vector<Surface::Crossing> BetweenCrossings::points_near(const std::vector<B
                                                              const std::vector<Vec3>& vertices,
                                                              const std::vector<Triangle>& triangles,
                                                              const MeshDistances& at_crossings) {
-    // Distances changed within a cutoff of what changed, turns at its vertices.
+    // Distances changed within a cutoff of what changed, and turns at its vertices, so that along the
+    // triangles there others are at a fold.
     std::vector<int> near;
     std::vector<char> is_near(crossings_.size(), 0);
-    for (const Box& box : changed)
-        crossings_.for_each_in(Box(box.min() - Vec3::Constant(cutoff), box.max() + Vec3::Constant(cutoff)),
-                               [&](std::size_t c) {
-                                   if (!is_near[c]) near.push_back(static_cast<int>(c));
-                                   is_near[c] = 1;
-                               });
+    const auto add_around = [&](const Box& box, double distance) {
+        const Vec3 reach = Vec3::Constant(distance);
+        crossings_.for_each_in(Box(box.min() - reach, box.max() + reach), [&](std::size_t c) {
+            if (!is_near[c]) near.push_back(static_cast<int>(c));
+            is_near[c] = 1;
+        });
+    };
+    for (const Box& box : changed) add_around(box, cutoff);
+    const std::vector<char> at_changes = crossings_.columns_of(near);
+    std::vector<char> turned(vertices.size(), 0);  // or may be
+    parallel_for_each(vertices.size(), kGrain,
+                      [&](std::size_t v) { turned[v] = crossings_.meets(Box(vertices[v]), at_changes); });
+    for (const Triangle& t : triangles) {
+        if (!turned[t[0]] && !turned[t[1]] && !turned[t[2]]) continue;
+        Box box;
+        for (const int v : t) box.extend(vertices[v]);
+        add_around(box, tolerance_);
+    }
     std::sort(near.begin(), near.end());
     const std::vector<char> columns = crossings_.columns_of(near);
     std::vector<char> beside(triangles.size()), at(vertices.size(), 0);

@@ -18,12 +18,11 @@ constexpr double kApart = 1.5;  // places that near are one
 constexpr double kReaches[] = {1.5, 2.0, 2.7, 3.5, 4.7};
 constexpr double kLatticeReach = 16.0;  // around the places
 constexpr double kMargin = 1.0;         // around a patch, of what is counted for it
-constexpr int kMostTrials = 4;          // of a batch, each with fewer patches than the one before
 
 /// A patch on trial.
 struct Candidate {
     Patch patch;
-    Box box;  // of what goes, and some more
+    Box box;  // of the place, what goes and what comes, and some more
     bool is_out = false;
 };
 
@@ -52,7 +51,9 @@ public:
                           [&](std::size_t p) { gone[p] = triangles_around(places[p], reach, bins_); });
         std::vector<char> taken(trials_.mesh().vertices.size(), 0);
         std::vector<std::vector<int>> apart;
-        for (std::vector<int>& some : gone) {
+        std::vector<Vec3> middles;  // of these
+        for (std::size_t p = 0; p < places.size(); ++p) {
+            std::vector<int>& some = gone[p];
             const auto is_taken = [&](int t) {
                 const Triangle& corners = bins_.triangles()[t];
                 return std::any_of(corners.begin(), corners.end(), [&](int v) { return taken[v] != 0; });
@@ -61,6 +62,7 @@ public:
             for (const int t : some)
                 for (const int v : bins_.triangles()[t]) taken[v] = 1;
             apart.push_back(std::move(some));
+            middles.push_back(places[p]);
         }
         std::vector<std::optional<Patch>> patches(apart.size());
         parallel_for_each(apart.size(), 1, [&](std::size_t p) {
@@ -69,10 +71,12 @@ public:
             const std::vector<Vec3> corners = corners_of(*patches[p], trials_.mesh());
             if (has_flat_triangle(corners) || !trials_.may_have(corners)) patches[p].reset();
         });
-        for (auto& patch : patches) {
+        for (std::size_t p = 0; p < patches.size(); ++p) {
+            auto& patch = patches[p];
             if (!patch) continue;
-            Box box;
+            Box box(middles[p]);
             for (const int t : patch->gone) box.extend(bins_.box_of(t));
+            for (const Vec3& corner : corners_of(*patch, trials_.mesh())) box.extend(corner);
             candidates_.push_back({std::move(*patch), with_margin(box, margin_)});
         }
     }
@@ -80,7 +84,7 @@ public:
     /// Puts in as many of them as do good. Returns how many.
     std::size_t put_in() {
         const std::vector<Vec3> failing = trials_.failing_places();
-        for (int trial = 0; trial < kMostTrials; ++trial) {
+        for (;;) {  // with fewer each time
             FrameMesh other = leave_out_crossing();
             if (candidates_.empty()) break;
             const MeshTrials::Outlook outlook = trials_.look_at(other);
@@ -135,6 +139,10 @@ private:
 };
 
 }  // namespace
+
+bool fails_at_many(const MeshTrials& trials, const Surface& surface) {
+    return apart(trials.failing_places(), kApart * surface.resolution()).size() > kManyFailing;
+}
 
 std::size_t mend_in_batches(MeshTrials& trials, const Surface& surface) {
     const double resolution = surface.resolution();

@@ -7,8 +7,9 @@
 
 namespace isotrack {
 
-/// Places where a mesh fails: more are mended in batches, no more one after the other.
+/// Places apart from each other where a mesh fails: more are mended in batches, no more one after the other.
 constexpr std::size_t kManyFailing = 64;
+bool fails_at_many(const MeshTrials& trials, const Surface& surface);
 
 /// Where a mesh fails at many places, as on a splash with drops and sheets of a voxel, of which particles
 /// make crumbs: parts around the places are exchanged for those of the lattice of the surface, small ones

@@ -305,12 +305,12 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true)) {
         // Where something small is, which takes a tenth of the time, then everywhere.
         for (const bool everywhere : {false, true}) {
-            if (now == 0 || (everywhere && now > kMostAstray)) break;
+            if (now == 0 || effort.is_enough() || (everywhere && now > kMostAstray)) break;
             std::vector<Vec3> others = everywhere ? places_everywhere(trials.mesh(), resolution)
                                                   : other_places(trials.mesh(), surface);
             if (others.empty()) continue;
             make_lattice(others, kTriedReach);
-            search(patcher->unlike(others, false), true);
+            search(patcher->unlike(others, !everywhere), true);
         }
         all_have_lattice = false;
     }

@@ -558,7 +558,7 @@ void Tracker::Impl::Making::patch() {
     const StageTimer timer(work_.frame.seconds, "certify");
     const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
     MeshTrials of_mesh(work_.mesh, work_.inspection, *work_.inspector, work_.limits);
-    const bool fails_much = of_mesh.failing_places().size() > kManyFailing;
+    const bool fails_much = fails_at_many(of_mesh, work_.surface);
     if (fails_much) mend_in_batches(of_mesh, work_.surface);
     if (!has_topology()) {
         if (work_.inspection.topology.speck.size() != work_.mesh.carved.triangles.size())
