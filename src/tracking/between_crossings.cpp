@@ -53,6 +53,22 @@ std::vector<float> turns_at_vertices(const std::vector<Vec3>& vertices,
     return result;
 }
 
+/// Flags for the vertices that are at some places, which floats hold.
+std::vector<char> flags_at(const std::vector<Eigen::Vector3f>& places, const std::vector<Vec3>& vertices) {
+    using Place = std::array<float, 3>;
+    const auto as_array = [](const Eigen::Vector3f& p) { return Place{p.x(), p.y(), p.z()}; };
+    std::vector<Place> sorted;
+    sorted.reserve(places.size());
+    for (const Eigen::Vector3f& p : places) sorted.push_back(as_array(p));
+    std::sort(sorted.begin(), sorted.end());
+    sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+    std::vector<char> result(vertices.size());
+    parallel_for_each(vertices.size(), kGrain, [&](std::size_t v) {
+        result[v] = std::binary_search(sorted.begin(), sorted.end(), as_array(vertices[v].cast<float>()));
+    });
+    return result;
+}
+
 }  // namespace
 
 void BetweenCrossings::flag_at_folds(const std::vector<Triangle>& triangles, const std::vector<float>& turns,
@@ -114,41 +130,30 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
         }));
 }
 
-std::vector<Surface::Crossing> BetweenCrossings::points_near(const std::vector<Box>& changed, double cutoff,
+std::vector<Surface::Crossing> BetweenCrossings::points_near(const Changes& changes,
                                                              const std::vector<Vec3>& vertices,
                                                              const std::vector<Triangle>& triangles,
                                                              const MeshDistances& at_crossings) {
-    // Distances changed within a cutoff of what changed, and turns at its vertices, so that along the
-    // triangles there others are at a fold.
-    std::vector<int> near;
-    std::vector<char> is_near(crossings_.size(), 0);
-    const auto add_around = [&](const Box& box, double distance) {
-        const Vec3 reach = Vec3::Constant(distance);
-        crossings_.for_each_in(Box(box.min() - reach, box.max() + reach), [&](std::size_t c) {
-            if (!is_near[c]) near.push_back(static_cast<int>(c));
-            is_near[c] = 1;
-        });
+    // Crossings whose distances changed are looked at; and since normals turned at the corners of what came,
+    // those along the triangles there, which may be at a fold now.
+    const auto box_along = [&](const Triangle& t) {
+        const Vec3 reach = Vec3::Constant(tolerance_);
+        const Vec3 &a = vertices[t[0]], &b = vertices[t[1]], &c = vertices[t[2]];
+        return Box(a.cwiseMin(b).cwiseMin(c) - reach, a.cwiseMax(b).cwiseMax(c) + reach);
     };
-    for (const Box& box : changed) add_around(box, cutoff);
-    const std::vector<char> at_changes = crossings_.columns_of(near);
-    std::vector<char> turned(vertices.size(), 0);  // or may be
-    parallel_for_each(vertices.size(), kGrain,
-                      [&](std::size_t v) { turned[v] = crossings_.meets(Box(vertices[v]), at_changes); });
-    for (const Triangle& t : triangles) {
-        if (!turned[t[0]] && !turned[t[1]] && !turned[t[2]]) continue;
-        Box box;
-        for (const int v : t) box.extend(vertices[v]);
-        add_around(box, tolerance_);
-    }
-    std::sort(near.begin(), near.end());
+    std::vector<char> is_near(crossings_.size(), 0);
+    for (const int c : changes.crossings) is_near[c] = 1;
+    const std::vector<char> turned = flags_at(changes.corners, vertices);
+    for (const Triangle& t : triangles)
+        if (turned[t[0]] || turned[t[1]] || turned[t[2]])
+            crossings_.for_each_in(box_along(t), [&](std::size_t c) { is_near[c] = 1; });
+    std::vector<int> near;
+    for (std::size_t c = 0; c < is_near.size(); ++c)
+        if (is_near[c]) near.push_back(static_cast<int>(c));
     const std::vector<char> columns = crossings_.columns_of(near);
     std::vector<char> beside(triangles.size()), at(vertices.size(), 0);
-    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
-        Box box;
-        for (const int v : triangles[t]) box.extend(vertices[v]);
-        const Vec3 reach = Vec3::Constant(tolerance_);
-        beside[t] = crossings_.meets(Box(box.min() - reach, box.max() + reach), columns);
-    });
+    parallel_for_each(triangles.size(), kGrain,
+                      [&](std::size_t t) { beside[t] = crossings_.meets(box_along(triangles[t]), columns); });
     std::vector<Triangle> some, around;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         if (!beside[t]) continue;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <vector>
 
 #include "isotrack/meshing/manifold.h"
@@ -29,10 +30,15 @@ public:
                                           const std::vector<Triangle>& triangles,
                                           const MeshDistances& at_crossings);
 
-    /// The same of a mesh that differs from the one looked at last by triangles in these boxes alone, those
-    /// that went among them. `cutoff`: of the distances.
-    std::vector<Surface::Crossing> points_near(const std::vector<Box>& changed, double cutoff,
-                                               const std::vector<Vec3>& vertices,
+    /// What has changed since a mesh was looked at last.
+    struct Changes {
+        std::size_t triangles = 0;             ///< So many came or went.
+        std::vector<Eigen::Vector3f> corners;  ///< Of those that came.
+        std::vector<int> crossings;            ///< Whose distances may be others, each at least once.
+        bool all = true;                       ///< Nothing is known of that.
+    };
+    /// The same of a mesh that differs by so much from the one looked at last.
+    std::vector<Surface::Crossing> points_near(const Changes& changes, const std::vector<Vec3>& vertices,
                                                const std::vector<Triangle>& triangles,
                                                const MeshDistances& at_crossings);
 

@@ -259,13 +259,17 @@ Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     Inspection result;
     doubt(measure_errors(mesh, result), kVainSpacing, result);
     measured_ = true;
-    for (const auto* changed : {&changes_.came, &changes_.went})
-        for (const Facet& facet : *changed) since_look_.push_back(facet.box());
+    since_look_.triangles += changes_.came.size() + changes_.went.size();
+    for (const Facet& facet : changes_.came)
+        since_look_.corners.insert(since_look_.corners.end(), facet.corner.begin(), facet.corner.end());
     if (!changes_.many)
         changes_.around = triangles_near_gone(changes_.went, kAroundChanges * cutoff(), mesh.vertices,
                                               mesh.carved.triangles);
     for (std::size_t d = 0; d < distances_.size(); ++d) {
-        distances_[d].measure(mesh.vertices, mesh.carved.triangles, changes_);
+        const auto changed = distances_[d].measure(mesh.vertices, mesh.carved.triangles, changes_);
+        if (d == 0 && !changed) since_look_.all = true;
+        if (d == 0 && changed)
+            since_look_.crossings.insert(since_look_.crossings.end(), changed->begin(), changed->end());
         take_missed(d, result);
     }
     return result;
@@ -304,13 +308,13 @@ void Inspector::look_between(const FrameMesh& mesh, Inspection& inspection) {
         if (!thins_out()) diagonals = sides_ ? sides_->diagonals() : surface_.diagonals();
         between_crossings_.emplace(surface_, crossings_, diagonals, limits_.tolerance);
     }
-    const bool all = !looked_between_ || static_cast<double>(since_look_.size()) >
-                                             kMany * static_cast<double>(mesh.carved.triangles.size());
+    const bool all = since_look_.all || static_cast<double>(since_look_.triangles) >
+                                            kMany * static_cast<double>(mesh.carved.triangles.size());
     auto points = all ? between_crossings_->points(mesh.vertices, mesh.carved.triangles, distances_.front())
-                      : between_crossings_->points_near(since_look_, cutoff(), mesh.vertices,
-                                                        mesh.carved.triangles, distances_.front());
-    looked_between_ = true;
-    since_look_.clear();
+                      : between_crossings_->points_near(since_look_, mesh.vertices, mesh.carved.triangles,
+                                                        distances_.front());
+    since_look_ = {};
+    since_look_.all = false;
     if (!thins_out()) set_unreachable_aside(points);
     measure_between(points, mesh, inspection);
 }
@@ -333,8 +337,8 @@ std::vector<Surface::Crossing> Inspector::newly_missed(const Inspection& now,
 
 void Inspector::forget_distances() {
     for (MeshDistances& distances : distances_) distances.forget();
-    measured_ = looked_between_ = false;
-    since_look_.clear();
+    measured_ = false;
+    since_look_ = {};
     for (std::vector<int>& missed : missed_) missed.clear();
 }
 

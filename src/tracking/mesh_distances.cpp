@@ -30,11 +30,12 @@ std::vector<Triangle> triangles_near_gone(const std::vector<Facet>& went, double
         });
 }
 
-void MeshDistances::measure(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-                            const FacetChanges& changes) {
+std::optional<std::vector<int>> MeshDistances::measure(const std::vector<Vec3>& vertices,
+                                                       const std::vector<Triangle>& triangles,
+                                                       const FacetChanges& changes) {
     if (distances_.empty() || changes.many) {
         distances_ = crossing_distances(vertices, triangles, points_, cutoff_);
-        return;
+        return std::nullopt;
     }
     // What was nearest to a triangle that went is to be measured again; what is nearer to one that came than
     // to all before is measured now.
@@ -72,9 +73,14 @@ void MeshDistances::measure(const std::vector<Vec3>& vertices, const std::vector
         distances_[n.point] = kUnknown;
         unknown.push_back(n.point);
     }
-    for (const Near& n : near(changes.came, [&](double d) { return std::min(d, cutoff_); }))
+    std::vector<int> changed;
+    for (const Near& n : near(changes.came, [&](double d) { return std::min(d, cutoff_); })) {
         distances_[n.point] = std::min(distances_[n.point], n.distance);
+        changed.push_back(n.point);
+    }
     crossing_distances(vertices, changes.around, points_, unknown, cutoff_, distances_);
+    changed.insert(changed.end(), unknown.begin(), unknown.end());
+    return changed;
 }
 
 MeshDistances::Survey MeshDistances::survey(double limit) const {

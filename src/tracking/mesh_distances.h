@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "isotrack/meshing/manifold.h"
@@ -31,9 +32,10 @@ public:
 
     void forget() { distances_.clear(); }
     /// `changes`: since the mesh measured last, if there is one, with the triangles within two cutoffs
-    /// around.
-    void measure(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-                 const FacetChanges& changes);
+    /// around. Returns the points whose distances may be others now, each at least once; nullopt: all.
+    std::optional<std::vector<int>> measure(const std::vector<Vec3>& vertices,
+                                            const std::vector<Triangle>& triangles,
+                                            const FacetChanges& changes);
 
     struct Survey {
         std::vector<int> beyond;  ///< The points farther than a limit, lost ones among them; ascending.

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "isotrack/surface/shapes.h"
-#include "meshing/triangle_box.h"
 #include "support/carved.h"
 #include "surface/cell_points.h"
+#include "surface/float_precision.h"
 #include "tracking/between_crossings.h"
 #include "tracking/facets.h"
 #include "tracking/failing.h"
@@ -72,6 +72,7 @@ TEST(Inspector, FindsTheSameBetweenCrossingsByWhatChanged) {
         distances.measure(vertices, triangles, {});
         return distances;
     };
+    MeshDistances kept = measured(mesh.vertices);
     const auto sorted = [](const std::vector<Surface::Crossing>& points) {
         std::vector<std::array<double, 3>> result;
         for (const auto& c : points) result.push_back({c.point.x(), c.point.y(), c.point.z()});
@@ -83,18 +84,26 @@ TEST(Inspector, FindsTheSameBetweenCrossingsByWhatChanged) {
     std::size_t found = 0;
     std::vector<Vec3> vertices = mesh.vertices;
     for (std::size_t v = 5; v < vertices.size(); v += vertices.size() / 7) {  // one dent after the other
-        std::vector<Box> changed;
-        const auto note = [&] {
+        const auto facets = [&] {
+            std::vector<Facet> result;
             for (const Triangle& t : triangles)
                 if (std::find(t.begin(), t.end(), static_cast<int>(v)) != t.end())
-                    changed.push_back(box_of(vertices, t));
+                    result.push_back({0,
+                                      {vertices[t[0]].cast<float>(), vertices[t[1]].cast<float>(),
+                                       vertices[t[2]].cast<float>()}});
+            return result;
         };
-        note();
-        vertices[v] *= 1.0 - 0.05 / vertices[v].norm();
-        note();
-        const MeshDistances distances = measured(vertices);
-        const auto expected = sorted(all.points(vertices, triangles, distances));
-        EXPECT_EQ(sorted(by_changes.points_near(changed, kCutoff, vertices, triangles, distances)), expected);
+        FacetChanges changes;
+        changes.went = facets();
+        vertices[v] = to_float_precision(vertices[v] * (1.0 - 0.05 / vertices[v].norm()));
+        changes.came = facets();
+        changes.around = triangles_near_gone(changes.went, 2.01 * kCutoff, vertices, triangles);
+        BetweenCrossings::Changes changed;
+        for (const Facet& facet : changes.came)
+            changed.corners.insert(changed.corners.end(), facet.corner.begin(), facet.corner.end());
+        changed.crossings = kept.measure(vertices, triangles, changes).value();
+        const auto expected = sorted(all.points(vertices, triangles, measured(vertices)));
+        EXPECT_EQ(sorted(by_changes.points_near(changed, vertices, triangles, kept)), expected);
         found += expected.size();
     }
     EXPECT_GT(found, 20u);
