@@ -1,6 +1,7 @@
 #include "meshing/blunting.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "isotrack/meshing/certify.h"
@@ -8,72 +9,140 @@
 #include "meshing/sharpness.h"
 #include "meshing/stands_for.h"
 #include "meshing/triangle_box.h"
+#include "parallel_for_each.h"
 #include "sampling/compact.h"
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
 
+constexpr double kShort = 0.5;  // details: longest edge of what is moved only where there is little of it
 constexpr long kShortOnes = 500;
 constexpr std::size_t kTrianglesPerShortOne = 100;
 
+using Sharp = std::pair<double, int>;  // minus the sharpness of a triangle, and which it is
+
+/// A sharp triangle, and what may be done about it.
+struct Look {
+    int triangle;
+    double sharpness;
+    bool is_short, may_move;
+    std::optional<Proposal> found;
+};
+
+/// Takes triangles out of a list in its order, as long as what is done about one is of no matter to another.
+class Independent {
+public:
+    explicit Independent(const BluntedMesh& mesh) : mesh_(mesh), claimed_(mesh.points.size(), 0) {}
+
+    std::vector<Sharp> take_from(std::vector<Sharp>& sharp) {
+        ++round_;
+        std::vector<Sharp> taken, left;
+        for (std::size_t s = 0; s < sharp.size(); ++s) {
+            if (taken.size() == kMostAtOnce || left.size() == kMostPassedOver) {
+                left.insert(left.end(), sharp.begin() + static_cast<std::ptrdiff_t>(s), sharp.end());
+                break;
+            }
+            (is_claimed(sharp[s].second) ? left : taken).push_back(sharp[s]);
+            claim(sharp[s].second);
+        }
+        sharp = std::move(left);
+        return taken;
+    }
+
+private:
+    static constexpr std::size_t kMostAtOnce = 64, kMostPassedOver = 256;
+
+    /// What may be touched for an earlier one are the vertices of the triangles around its corners; what has
+    /// to be as it was for this one are its own corners and those beyond its edges.
+    bool is_claimed(int triangle) const {
+        const Triangle& t = mesh_.triangles[triangle];
+        for (int k = 0; k < 3; ++k) {
+            const int beyond = mesh_.corners.beyond(t[(k + 1) % 3], t[k], mesh_.triangles).first;
+            if (claimed_[t[k]] == round_ || (beyond >= 0 && claimed_[beyond] == round_)) return true;
+        }
+        return false;
+    }
+    void claim(int triangle) {
+        const Corners& corners = mesh_.corners;
+        for (const int v : mesh_.triangles[triangle])
+            for (int e = corners.first[v]; e < corners.first[v + 1]; ++e)
+                for (const int w : mesh_.triangles[corners.corner[e] / 3]) claimed_[w] = round_;
+    }
+
+    const BluntedMesh& mesh_;
+    std::vector<int> claimed_;  // in which round
+    int round_ = 0;
+};
+
 }  // namespace
+
 double BluntedMesh::sharpness_of(const Triangle& t) const {
     return sharpness(points[t[0]], points[t[1]], points[t[2]]);
 }
 
-double BluntedMesh::facing(const std::vector<Triangle>& some) const {
+double BluntedMesh::longest_edge_of(int triangle) const {
+    const auto [a, b, c] = places_of(triangles[triangle]);
+    return std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
+}
+
+namespace {
+
+/// The least of some triangles.
+double facing_of(const std::vector<Places>& some, Surface::Probe& probe) {
     double least = 1.0;
-    for (const Triangle& t : some)
-        least = std::min(least, isotrack::facing(points[t[0]], points[t[1]], points[t[2]], probe));
+    for (const auto& [a, b, c] : some) least = std::min(least, facing(a, b, c, probe));
     return least;
 }
 
-Replaced BluntedMesh::replaced(std::vector<int> numbers) const {
+}  // namespace
+
+Replaced BluntedMesh::replaced(std::vector<int> numbers, Surface::Probe& probe) const {
     Replaced result;
-    std::vector<Triangle> old;
+    std::vector<Places> old;
+    std::vector<int> beside;
     for (const int number : numbers) {
         const Triangle& t = triangles[number];
-        old.push_back(t);
-        result.triangles.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
+        old.push_back(places_of(t));
+        const auto& [a, b, c] = old.back();
+        result.triangles.emplace_back(a, b, c);
         result.box.extend(box_of(points, t));
-    }
-    result.facing = facing(old);
-    std::sort(numbers.begin(), numbers.end());
-    std::vector<int> beside;
-    for (const Triangle& t : old)
         for (const int v : t)
             for (int e = corners.first[v]; e < corners.first[v + 1]; ++e)
                 beside.push_back(corners.corner[e] / 3);
+    }
+    result.facing = facing_of(old, probe);
+    std::sort(numbers.begin(), numbers.end());
     std::sort(beside.begin(), beside.end());
     beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
     for (const int number : beside) {
         if (std::binary_search(numbers.begin(), numbers.end(), number)) continue;
-        const Triangle& t = triangles[number];
-        result.beside.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
+        const auto [a, b, c] = places_of(triangles[number]);
+        result.beside.emplace_back(a, b, c);
     }
     return result;
 }
 
-bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Triangle>& candidates) {
+bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Places>& candidates) const {
     std::vector<FacingTriangle> after;
-    for (const Triangle& t : candidates) after.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
+    for (const auto& [a, b, c] : candidates) after.emplace_back(a, b, c);
     return std::all_of(reached.begin(), reached.end(), [&](const CrossingGrid* points_there) {
         return stand_for_same(*points_there, before.triangles, before.box, after, before.beside, tolerance);
     });
 }
 
-bool BluntedMesh::may_have(const std::vector<Triangle>& candidates, const Replaced& before) {
-    if (!(facing(candidates) > std::min(kFacing, before.facing))) return false;
-    const auto passes = [&](const Triangle& t) {
-        const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+bool BluntedMesh::may_have(const std::vector<Places>& candidates, const Replaced& before,
+                           Surface::Probe& probe) const {
+    if (!(facing_of(candidates, probe) > std::min(kFacing, before.facing))) return false;
+    const auto passes = [&](const Places& t) {
+        const auto& [a, b, c] = t;
         const TriangleError error = certified_error(a, b, c, probe, detail, 0.5 * tolerance);
         return error.largest <= tolerance && error.turned_deg <= kMostTurnedDeg;
     };
     return std::all_of(candidates.begin(), candidates.end(), passes) && reach_what(before, candidates);
 }
 
-std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& except) {
-    if (!boxes) boxes = std::make_unique<TriangleBoxes>(points, triangles);
+std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& except) const {
     std::vector<Triangle> result;
     for (const int t : boxes->meeting(box))
         if (!std::binary_search(except.begin(), except.end(), t)) result.push_back(triangles[t]);
@@ -110,7 +179,7 @@ bool Blunter::run(int passes) {
 }
 
 bool Blunter::pass() {
-    std::vector<std::pair<double, int>> sharp;
+    std::vector<Sharp> sharp;
     for (std::size_t t = 0; t < triangles_.size(); ++t) {
         const auto& [i, j, k] = triangles_[t];
         if (!open_[i] && !open_[j] && !open_[k]) continue;
@@ -120,37 +189,67 @@ bool Blunter::pass() {
     open_.assign(points_.size(), 0);
     if (sharp.empty()) return false;
     std::sort(sharp.begin(), sharp.end());
+    if (!boxes_ && -sharp.front().first > kSharpnessAt18Degrees)
+        boxes_ = std::make_unique<TriangleBoxes>(points_, triangles_);
+    BluntedMesh mesh{points_,   triangles_,   Corners(points_.size(), triangles_),
+                     movable_,  fixed_,       tolerance_,
+                     detail_,   reached_,     lost_,
+                     searched_, boxes_.get(), std::vector<char>(points_.size(), 0)};
     const std::size_t before = changes_.size();
-    const auto probe = surface_.probe();
-    BluntedMesh mesh{points_,
-                     triangles_,
-                     Corners(points_.size(), triangles_),
-                     movable_,
-                     fixed_,
-                     tolerance_,
-                     detail_,
-                     *probe,
-                     reached_,
-                     lost_,
-                     searched_,
-                     short_ones_left_,
-                     std::vector<char>(points_.size(), 0),
-                     boxes_};
-    for (const auto& [sharpest, t] : sharp) {
-        for (const int v : triangles_[t])
-            if (mesh.touched[v]) open_[v] = 1;
-        auto change = flip(mesh, t, -sharpest);
-        if (!change) change = nudge(mesh, t, -sharpest);
-        if (!change) continue;
-        for (const int changed : change->triangle) {
-            if (boxes_) boxes_->note(changed);
-            unchecked_[changed] = 1;
-            searched_[changed] = 0;
-            for (const int v : triangles_[changed]) open_[v] = 1;
+    ThreadProbes probes(surface_);
+    const auto look_at = [&](Look& look) {
+        Surface::Probe& probe = probes.local();
+        const int t = look.triangle;
+        look.found = flip(mesh, t, look.sharpness, probe);
+        if (look.found || !look.may_move) return;
+        look.found = nudge(mesh, t, probe);
+        if (look.found || !(look.sharpness > kSharpnessAt18Degrees) || searched_[t]) return;
+        look.found = search(mesh, t, probe);
+        const Triangle& corners = triangles_[t];
+        const bool is_free =
+            std::none_of(corners.begin(), corners.end(), [&](int v) { return mesh.touched[v] != 0; });
+        searched_[t] = !look.found && is_free;
+    };
+    // Sharpest first, but those beside each other have to be looked at in order, others may be at once.
+    Independent independent(mesh);
+    while (!sharp.empty()) {
+        std::vector<Look> looks;
+        for (const auto& [sharpest, t] : independent.take_from(sharp)) {
+            const bool is_short = mesh.longest_edge_of(t) < kShort * detail_;
+            looks.push_back({t, -sharpest, is_short, !is_short || short_ones_left_ > 0, std::nullopt});
+            if (is_short) --short_ones_left_;  // unless it is flipped
         }
-        changes_.push_back(std::move(*change));
+        parallel_for_each(looks.size(), 1, [&](std::size_t l) { look_at(looks[l]); });
+        for (Look& look : looks) {
+            for (const int v : triangles_[look.triangle])
+                if (mesh.touched[v]) open_[v] = 1;
+            if (look.is_short && look.found && look.found->change.vertex < 0) ++short_ones_left_;
+            if (look.found) make(std::move(*look.found), mesh.touched);
+        }
     }
     return changes_.size() > before;
+}
+
+void Blunter::make(Proposal&& proposal, std::vector<char>& touched) {
+    auto& [change, after, to] = proposal;
+    if (change.vertex >= 0) {
+        points_[change.vertex] = to;
+    } else {
+        const Triangle &first = change.before[0], &second = change.before[1];
+        std::vector<int> common;
+        for (const int v : first)
+            if (std::find(second.begin(), second.end(), v) != second.end()) common.push_back(v);
+        lost_.insert(std::minmax(common[0], common[1]));
+        for (int i = 0; i < 2; ++i) triangles_[change.triangle[i]] = after[i];
+    }
+    for (const Triangle& t : change.before)
+        for (const int v : t) touched[v] = open_[v] = 1;
+    for (const int changed : change.triangle) {
+        if (boxes_) boxes_->note(changed);
+        unchecked_[changed] = 1;
+        searched_[changed] = 0;
+    }
+    changes_.push_back(std::move(change));
 }
 
 bool Blunter::undo_near(const std::vector<Vec3>& places, double distance) {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <algorithm>
-#include <memory>
+#include <array>
 #include <optional>
 #include <set>
 #include <utility>
@@ -24,36 +24,45 @@ struct Replaced {
     Box box;
 };
 
-/// A mesh in the course of a pass.
+/// A triangle by where its corners are.
+using Places = std::array<Vec3, 3>;
+
+/// A mesh in the course of a pass. Threads that look for changes share it, each with a probe of its own.
 struct BluntedMesh {
-    std::vector<Vec3>& points;
-    std::vector<Triangle>& triangles;
+    const std::vector<Vec3>& points;
+    const std::vector<Triangle>& triangles;
     const Corners corners;  ///< Of the start; still right around what is untouched.
     const std::vector<char>& movable;
     const std::vector<char>& fixed;  ///< Per vertex: a move of it was taken back.
     double tolerance;
     double detail;  ///< What is smaller need not be looked at.
-    Surface::Probe& probe;
     const std::vector<const CrossingGrid*>& reached;
-    std::set<std::pair<int, int>>&
-        lost;                     ///< Edges, ascending, that may come back and are not to be made anew.
-    std::vector<char>& searched;  ///< Per triangle: in vain, as it is.
-    long& short_ones_left;        ///< So many moves are still tried for triangles of less than half a detail.
-    std::vector<char> touched;    ///< Per vertex: a change is near.
-    std::unique_ptr<TriangleBoxes>& boxes;  ///< Made when they are asked for.
+    const std::set<std::pair<int, int>>&
+        lost;                           ///< Edges, ascending, that may come back and are not to be made anew.
+    const std::vector<char>& searched;  ///< Per triangle: in vain, as it is.
+    const TriangleBoxes* boxes;         ///< There when any triangle is below 18 degrees.
+    std::vector<char> touched;          ///< Per vertex: a change is near.
 
     double sharpness_of(const Triangle& t) const;
-    Replaced replaced(std::vector<int> numbers) const;
+    double longest_edge_of(int triangle) const;
+    Places places_of(const Triangle& t) const { return {points[t[0]], points[t[1]], points[t[2]]}; }
+    Replaced replaced(std::vector<int> numbers, Surface::Probe& probe) const;
     /// Whether all these triangles face the way the surface does, or no worse than those they stand for, are
     /// within the tolerance of it, and with those beside them keep what those stand for of what is reached
     /// within the tolerance.
-    bool may_have(const std::vector<Triangle>& candidates, const Replaced& before);
+    bool may_have(const std::vector<Places>& candidates, const Replaced& before, Surface::Probe& probe) const;
     /// The triangles but `except` (ascending) whose boxes meet this one.
-    std::vector<Triangle> near(const Box& box, const std::vector<int>& except);
+    std::vector<Triangle> near(const Box& box, const std::vector<int>& except) const;
 
 private:
-    double facing(const std::vector<Triangle>& some) const;
-    bool reach_what(const Replaced& before, const std::vector<Triangle>& candidates);
+    bool reach_what(const Replaced& before, const std::vector<Places>& candidates) const;
+};
+
+/// A change that may be made while the vertices it is about are untouched.
+struct Proposal {
+    Blunting change;
+    std::vector<Triangle> after;  ///< A flip's two triangles.
+    Vec3 to = Vec3::Zero();       ///< Where a vertex goes.
 };
 
 /// The largest cotangent that makes a change of triangles with this one worth it: a tenth less, or as little
@@ -64,9 +73,12 @@ inline double worth(double before) {
 }
 
 /// The other diagonal for the longest edge of a triangle with this cotangent.
-std::optional<Blunting> flip(BluntedMesh& mesh, int triangle, double sharpness);
+std::optional<Proposal> flip(const BluntedMesh& mesh, int triangle, double sharpness, Surface::Probe& probe);
 
-/// Another place for one of its corners.
-std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness);
+/// Another place for one of its corners, along the surface.
+std::optional<Proposal> nudge(const BluntedMesh& mesh, int triangle, Surface::Probe& probe);
+
+/// For what nothing cheaper helps: another place in space for one of its corners. Takes many times longer.
+std::optional<Proposal> search(const BluntedMesh& mesh, int triangle, Surface::Probe& probe);
 
 }  // namespace isotrack

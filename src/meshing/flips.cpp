@@ -5,9 +5,9 @@
 
 namespace isotrack {
 
-std::optional<Blunting> flip(BluntedMesh& mesh, int triangle, double sharpness) {
+std::optional<Proposal> flip(const BluntedMesh& mesh, int triangle, double sharpness, Surface::Probe& probe) {
     const auto& points = mesh.points;
-    auto& triangles = mesh.triangles;
+    const auto& triangles = mesh.triangles;
     const auto beyond = [&](int v, int w) { return mesh.corners.beyond(v, w, triangles); };
     const Triangle& old = triangles[triangle];
     int k = 0;
@@ -19,7 +19,7 @@ std::optional<Blunting> flip(BluntedMesh& mesh, int triangle, double sharpness) 
             k = i;
         }
     }
-    auto& touched = mesh.touched;
+    const auto& touched = mesh.touched;
     const int a = old[k], b = old[(k + 1) % 3], c = old[(k + 2) % 3];
     if (touched[a] || touched[b] || touched[c]) return std::nullopt;
     const auto [d, other] = beyond(c, b);
@@ -29,12 +29,13 @@ std::optional<Blunting> flip(BluntedMesh& mesh, int triangle, double sharpness) 
     const Triangle first = {a, b, d}, second = {a, d, c};
     const double before = std::max(sharpness, mesh.sharpness_of(triangles[other]));
     if (!(std::max(mesh.sharpness_of(first), mesh.sharpness_of(second)) < worth(before))) return std::nullopt;
-    if (!mesh.may_have({first, second}, mesh.replaced({triangle, other}))) return std::nullopt;
-    Blunting result{{triangle, other}, {old, triangles[other]}};
-    mesh.lost.insert(std::minmax(b, c));
-    triangles[triangle] = first;
-    triangles[other] = second;
-    for (const int v : {a, b, c, d}) touched[v] = 1;
+    if (!mesh.may_have({mesh.places_of(first), mesh.places_of(second)},
+                       mesh.replaced({triangle, other}, probe), probe))
+        return std::nullopt;
+    Proposal result;
+    result.change.triangle = {triangle, other};
+    result.change.before = {old, triangles[other]};
+    result.after = {first, second};
     return result;
 }
 

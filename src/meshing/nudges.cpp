@@ -19,11 +19,11 @@ constexpr double kFirstStep = 0.3, kLastStep = 0.02;  // of the mean edge
 constexpr int kHalvings = 2;                          // of a move that leaves the tolerance
 constexpr double kFitted = 0.01;                      // tolerances: what is that far off may be farther off
 constexpr double kLift = 0.25;                        // tolerances: so far up or down
-constexpr double kShort = 0.5;  // details: longest edge of what is looked at only where there is little of it
 
 /// The triangles around a vertex.
 struct Star {
     std::vector<int> triangle;
+    std::vector<int> corner;                    // which of each the vertex is
     std::vector<std::array<Vec3, 2>> opposite;  // edge of each
     double mean_edge = 0.0;
 
@@ -32,6 +32,7 @@ struct Star {
         for (int e = corners.first[v]; e < corners.first[v + 1]; ++e) {
             const int t = corners.corner[e] / 3, k = corners.corner[e] % 3;
             triangle.push_back(t);
+            corner.push_back(k);
             opposite.push_back({points[triangles[t][(k + 1) % 3]], points[triangles[t][(k + 2) % 3]]});
             mean_edge += (opposite.back()[0] - points[v]).norm();
         }
@@ -42,6 +43,17 @@ struct Star {
         double result = 0.0;
         for (std::size_t i = 0; i < opposite.size() && result <= enough; ++i)
             result = std::max(result, sharpness(x, opposite[i][0], opposite[i][1]));
+        return result;
+    }
+    /// Its triangles with the vertex at x.
+    std::vector<Places> with(const Vec3& x) const {
+        std::vector<Places> result(opposite.size());
+        for (std::size_t i = 0; i < opposite.size(); ++i) {
+            const int k = corner[i];
+            result[i][k] = x;
+            result[i][(k + 1) % 3] = opposite[i][0];
+            result[i][(k + 2) % 3] = opposite[i][1];
+        }
         return result;
     }
 };
@@ -65,48 +77,97 @@ Vec3 bluntest_place(const Star& star, const Vec3& from, const Vec3& normal) {
     return best;
 }
 
-/// Marks the vertices of the triangles around v, which moved from there, and says what was done.
-Blunting moved(BluntedMesh& mesh, const Star& star, const std::vector<Triangle>& around, int v,
-               const Vec3& from) {
-    for (const Triangle& t : around)
-        for (const int w : t) mesh.touched[w] = 1;
-    return {star.triangle, around, v, from};
-}
-
-std::vector<Triangle> triangles_of(const Star& star, const BluntedMesh& mesh) {
-    std::vector<Triangle> result;
-    for (const int t : star.triangle) result.push_back(mesh.triangles[t]);
+Proposal move_of(int v, const Star& star, const Vec3& to, const BluntedMesh& mesh) {
+    Proposal result{{star.triangle, {}, v, mesh.points[v]}, {}, to};
+    for (const int t : star.triangle) result.change.before.push_back(mesh.triangles[t]);
     return result;
 }
 
-double longest_edge(const BluntedMesh& mesh, int triangle) {
-    const auto& [a, b, c] = mesh.triangles[triangle];
-    const auto& at = mesh.points;
-    return std::sqrt(std::max(
-        {(at[b] - at[a]).squaredNorm(), (at[c] - at[b]).squaredNorm(), (at[a] - at[c]).squaredNorm()}));
+/// The triangles near a star, to be crossed by it.
+class Surroundings {
+public:
+    Surroundings(const Star& star, const Box& box, const BluntedMesh& mesh) : star_(star) {
+        for (const Triangle& t : mesh.near(box, star.triangle)) {
+            const int first = static_cast<int>(points_.size());
+            for (const Vec3& p : mesh.places_of(t)) points_.push_back(p);
+            others_.push_back({first, first + 1, first + 2});
+        }
+    }
+    /// With the vertex at x. Corners are common by place.
+    bool are_crossed(const Vec3& x) const {
+        std::vector<Vec3> points = points_;
+        std::vector<Triangle> around;
+        for (const Places& t : star_.with(x)) {
+            const int first = static_cast<int>(points.size());
+            points.insert(points.end(), t.begin(), t.end());
+            around.push_back({first, first + 1, first + 2});
+        }
+        return any_cross(points, around, others_);
+    }
+
+private:
+    const Star& star_;
+    std::vector<Vec3> points_;
+    std::vector<Triangle> others_;
+};
+
+}  // namespace
+
+std::optional<Proposal> nudge(const BluntedMesh& mesh, int triangle, Surface::Probe& probe) {
+    struct Move {
+        int vertex;
+        Star star;
+        Vec3 to;
+        double before, after;  // cotangents
+    };
+    std::vector<Move> moves;
+    for (const int v : mesh.triangles[triangle]) {
+        if (!mesh.movable[v] || mesh.fixed[v] || mesh.touched[v]) continue;
+        Star star(v, mesh);
+        const Vec3 from = mesh.points[v], normal = probe.normal(from);
+        if (normal == Vec3::Zero()) continue;
+        const Vec3 to = bluntest_place(star, from, normal);
+        const double before = star.sharpness_at(from), after = star.sharpness_at(to);
+        if (after < worth(before)) moves.push_back({v, std::move(star), to, before, after});
+    }
+    std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) { return a.after < b.after; });
+    for (const auto& [v, star, goal, before, after] : moves) {
+        const Vec3 from = mesh.points[v];
+        const double height = probe.value(from);
+        const double lift = std::abs(height) > kFitted * mesh.tolerance ? kLift * mesh.tolerance : 0.0;
+        const Replaced replaced = mesh.replaced(star.triangle, probe);
+        Vec3 way = goal - from;
+        for (int halving = 0; halving <= kHalvings; ++halving, way *= 0.5) {
+            const auto on_surface = probe.project(from + way);
+            if (!on_surface) continue;
+            const Vec3 n = probe.normal(*on_surface);
+            for (const double h : {height, height + lift, height - lift}) {
+                const Vec3 to = to_float_precision(*on_surface + h * n);
+                if (!(star.sharpness_at(to) < worth(before))) continue;
+                if (mesh.may_have(star.with(to), replaced, probe)) return move_of(v, star, to, mesh);
+                if (lift == 0.0) break;
+            }
+        }
+    }
+    return std::nullopt;
 }
 
-/// For what nothing cheaper helps: a pattern search in space over the places that the mesh may have, for each
-/// corner; the bluntest counts.
-std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
-    auto& points = mesh.points;
-    int vertex = -1;
-    Vec3 place;
+/// A pattern search over the places that the mesh may have, for each corner; the bluntest counts.
+std::optional<Proposal> search(const BluntedMesh& mesh, int triangle, Surface::Probe& probe) {
+    std::optional<Proposal> result;
     double bluntest = std::numeric_limits<double>::infinity();
     for (const int v : mesh.triangles[triangle]) {
         if (!mesh.movable[v] || mesh.touched[v]) continue;
         const Star star(v, mesh);
-        const std::vector<Triangle> around = triangles_of(star, mesh);
-        const Replaced before = mesh.replaced(star.triangle);
-        const Vec3 from = points[v], reach = Vec3::Constant(star.mean_edge);
-        std::optional<std::vector<Triangle>> others;  // nearby
-        const auto crosses_others = [&] {
-            if (!others)
-                others = mesh.near(Box(before.box.min() - reach, before.box.max() + reach), star.triangle);
-            return any_cross(points, around, *others);
+        const Replaced before = mesh.replaced(star.triangle, probe);
+        const Vec3 reach = Vec3::Constant(star.mean_edge);
+        std::optional<Surroundings> others;
+        const auto crosses_others = [&](const Vec3& x) {
+            if (!others) others.emplace(star, Box(before.box.min() - reach, before.box.max() + reach), mesh);
+            return others->are_crossed(x);
         };
-        Vec3 best = from;
-        double least = star.sharpness_at(from);
+        Vec3 best = mesh.points[v];
+        double least = star.sharpness_at(best);
         const double enough = worth(least);
         for (double step = kFirstStep; step >= kLastStep;) {
             std::vector<std::pair<double, Vec3>> blunter;
@@ -120,78 +181,19 @@ std::optional<Blunting> search(BluntedMesh& mesh, int triangle) {
             std::sort(blunter.begin(), blunter.end(),
                       [](const auto& p, const auto& q) { return p.first < q.first; });
             const auto found = std::find_if(blunter.begin(), blunter.end(), [&](const auto& candidate) {
-                points[v] = candidate.second;
-                return mesh.may_have(around, before) && !crosses_others();
+                const Vec3& x = candidate.second;
+                return mesh.may_have(star.with(x), before, probe) && !crosses_others(x);
             });
             if (found == blunter.end())
                 step *= 0.5;
             else
                 std::tie(least, best) = *found;
         }
-        points[v] = from;
         if (!(least < enough) || !(least < bluntest)) continue;
         bluntest = least;
-        vertex = v;
-        place = best;
+        result = move_of(v, star, best, mesh);
     }
-    if (vertex < 0) return std::nullopt;
-    const Star star(vertex, mesh);
-    const Vec3 from = points[vertex];
-    points[vertex] = place;
-    return moved(mesh, star, triangles_of(star, mesh), vertex, from);
-}
-
-}  // namespace
-
-std::optional<Blunting> nudge(BluntedMesh& mesh, int triangle, double sharpness) {
-    if (longest_edge(mesh, triangle) < kShort * mesh.detail && mesh.short_ones_left-- <= 0)
-        return std::nullopt;
-    auto& points = mesh.points;
-    struct Move {
-        int vertex;
-        Star star;
-        Vec3 to;
-        double before, after;  // cotangents
-    };
-    std::vector<Move> moves;
-    for (const int v : mesh.triangles[triangle]) {
-        if (!mesh.movable[v] || mesh.fixed[v] || mesh.touched[v]) continue;
-        Star star(v, mesh);
-        const Vec3 normal = mesh.probe.normal(points[v]);
-        if (normal == Vec3::Zero()) continue;
-        const Vec3 to = bluntest_place(star, points[v], normal);
-        const double before = star.sharpness_at(points[v]), after = star.sharpness_at(to);
-        if (after < worth(before)) moves.push_back({v, std::move(star), to, before, after});
-    }
-    std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) { return a.after < b.after; });
-    for (const auto& [v, star, goal, before, after] : moves) {
-        const Vec3 from = points[v];
-        const double height = mesh.probe.value(from);
-        const double lift = std::abs(height) > kFitted * mesh.tolerance ? kLift * mesh.tolerance : 0.0;
-        const std::vector<Triangle> around = triangles_of(star, mesh);
-        const Replaced replaced = mesh.replaced(star.triangle);
-        Vec3 way = goal - from;
-        for (int halving = 0; halving <= kHalvings; ++halving, way *= 0.5) {
-            const auto on_surface = mesh.probe.project(from + way);
-            if (!on_surface) continue;
-            const Vec3 n = mesh.probe.normal(*on_surface);
-            for (const double h : {height, height + lift, height - lift}) {
-                const Vec3 to = to_float_precision(*on_surface + h * n);
-                if (!(star.sharpness_at(to) < worth(before))) continue;
-                points[v] = to;
-                if (mesh.may_have(around, replaced)) return moved(mesh, star, around, v, from);
-                points[v] = from;
-                if (lift == 0.0) break;
-            }
-        }
-    }
-    if (!(sharpness > kSharpnessAt18Degrees) || mesh.searched[triangle]) return std::nullopt;
-    const Triangle& corners = mesh.triangles[triangle];
-    const bool is_free =
-        std::none_of(corners.begin(), corners.end(), [&](int v) { return mesh.touched[v] != 0; });
-    auto found = search(mesh, triangle);
-    mesh.searched[triangle] = !found && is_free;
-    return found;
+    return result;
 }
 
 }  // namespace isotrack

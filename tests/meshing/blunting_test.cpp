@@ -2,6 +2,7 @@
 #include "isotrack/meshing/blunting.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -230,6 +231,23 @@ TEST(Blunter, CrossesNoOtherPartOfTheMesh) {
     ASSERT_TRUE(blunter.run(1));
     EXPECT_TRUE(self_intersections(mesh).empty());
     for (const Blunting& change : blunter.changes()) EXPECT_NE(change.triangle, first.triangle);
+}
+
+TEST_F(RoughSphere, IsTheSameAtAnyNumberOfThreads) {
+    // Many sharp triangles are beside each other here, so that one has to wait for another.
+    std::vector<TriangleMesh> made;
+    for (const std::size_t threads : {1, 2, 4}) {
+        const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+        after = before;
+        blunter(true).run(3 * kPasses);
+        made.push_back(after);
+    }
+    EXPECT_NE(made[0].triangles, before.triangles);
+    EXPECT_NE(made[0].points, before.points);
+    for (const TriangleMesh& other : made) {
+        EXPECT_EQ(other.triangles, made[0].triangles);
+        EXPECT_EQ(other.points, made[0].points);
+    }
 }
 
 TEST_F(RoughSphere, LosesWhatIsNearAPlaceAndNothingElse) {

@@ -21,9 +21,11 @@ struct Blunting {
 };
 
 class TriangleBoxes;
+struct Proposal;
 
 /// Makes the sharp triangles of a mesh blunter. The mesh must be closed, oriented, manifold and free of
-/// crossings, and stays so; its topology does not change.
+/// crossings, and stays so; its topology does not change. Uses TBB inside; the result does not depend on the
+/// number of threads.
 class Blunter {
 public:
     /// `reached`: points of the surface, such as its lattice crossings, for triangles to stand for; more may
@@ -56,6 +58,7 @@ public:
 
 private:
     bool pass();
+    void make(Proposal&& proposal, std::vector<char>& touched);
     void undo(const std::vector<char>& marked);
     bool undo_crossing();  // whether there was any
 
@@ -68,7 +71,7 @@ private:
     std::vector<char> open_;       // per vertex: triangles around it are to be looked at
     std::vector<char> unchecked_;  // per triangle: changed since crossings were looked for
     std::vector<char> searched_;   // per triangle: see BluntedMesh
-    long short_ones_left_;         // likewise
+    long short_ones_left_;         // so many moves are still tried for triangles of less than half a detail
     std::vector<Blunting> changes_;
     std::set<std::pair<int, int>> lost_;  // edges that were flipped: taking that back brings them back
     std::unique_ptr<TriangleBoxes> boxes_;
