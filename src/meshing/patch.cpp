@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -322,8 +323,10 @@ PatchSource::PatchSource(TriangleMesh mesh, double spacing)
       normal_(mesh_.points.size(), Vec3::Zero()),
       beside_(mesh_.points.size()) {
     forget();
-    for (const Triangle& t : mesh_.triangles)
-        for (const int v : t) normal_[v] += area(t, mesh_.points);
+    for (const Triangle& t : mesh_.triangles) {
+        const Vec3 normal = area(t, mesh_.points);
+        for (const int v : t) normal_[v] += normal;
+    }
     for (Vec3& n : normal_) n.normalize();
 }
 
@@ -438,6 +441,46 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
             v = static_cast<std::size_t>(v) < own ? static_cast<int>(points.size()) + v : rim[v - own];
     patch.triangles = std::move(all);
     return patch;
+}
+
+bool stays_manifold(const Patch& patch, const TriangleBins& mesh) {
+    std::vector<int> corners;
+    for (const Triangle& t : patch.triangles) corners.insert(corners.end(), t.begin(), t.end());
+    std::sort(corners.begin(), corners.end());
+    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    using Turn = std::array<int, 3>;  // around a vertex, from one neighbour to the next
+    std::vector<Turn> turns;
+    const auto add = [&](const Triangle& t, int v) {
+        for (int k = 0; k < 3; ++k)
+            if (t[k] == v) turns.push_back({v, t[(k + 1) % 3], t[(k + 2) % 3]});
+    };
+    for (const Triangle& t : patch.triangles)
+        for (const int v : t) add(t, v);
+    for (const int v : corners) {
+        if (static_cast<std::size_t>(v) >= mesh.points().size()) break;  // no other has those that come
+        for (const int t : mesh.meeting(Box(mesh.points()[v])))
+            if (!std::binary_search(patch.gone.begin(), patch.gone.end(), t)) add(mesh.triangles()[t], v);
+    }
+    std::sort(turns.begin(), turns.end());
+    const auto is_one_fan = [](auto begin, auto end) {
+        for (auto turn = begin; turn + 1 != end; ++turn)
+            if ((*turn)[1] == (*(turn + 1))[1]) return false;
+        auto at = begin;
+        for (auto steps = end - begin; steps > 0; --steps) {
+            const int to = (*at)[2];
+            at = std::lower_bound(begin, end, to, [](const Turn& turn, int v) { return turn[1] < v; });
+            if (at == end || (*at)[1] != to) return false;
+            if (at == begin) return steps == 1;
+        }
+        return false;
+    };
+    for (auto begin = turns.begin(); begin != turns.end();) {
+        const auto end =
+            std::find_if(begin, turns.end(), [&](const Turn& turn) { return turn[0] != (*begin)[0]; });
+        if (!is_one_fan(begin, end)) return false;
+        begin = end;
+    }
+    return true;
 }
 
 }  // namespace isotrack

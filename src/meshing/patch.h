@@ -57,4 +57,8 @@ std::vector<int> triangles_around(const Vec3& place, double reach, const Triangl
 /// becomes, but for edges that it may have twice; it may cross itself.
 std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source);
 
+/// Whether a closed, oriented manifold stays one with a patch: around each of its vertices the triangles that
+/// come, and those that stay, are one closed fan.
+bool stays_manifold(const Patch& patch, const TriangleBins& mesh);
+
 }  // namespace isotrack

@@ -1,38 +1,64 @@
 #include "meshing/triangle_bins.h"
 
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+
+#include "parallel_for_each.h"
+
 namespace isotrack {
 
 TriangleBins::TriangleBins(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                            double size)
     : points_(points), triangles_(triangles), size_(size) {
     constexpr double kMostCubes = 8.0, kSome = 1000.0;  // for each triangle; in any case
-    Box bounds;
-    double sum = 0.0;
-    for (int t = 0; t < static_cast<int>(triangles.size()); ++t) {
-        bounds.extend(box_of(t));
-        sum += box_of(t).sizes().maxCoeff();
+    struct Extent {
+        Box bounds;
+        double sum = 0.0;
+    };
+    // In blocks, so that the sum does not depend on the number of threads.
+    constexpr std::size_t kBlock = 4096;
+    std::vector<Extent> extents((triangles.size() + kBlock - 1) / kBlock);
+    parallel_for_each(extents.size(), 1, [&](std::size_t b) {
+        for (std::size_t t = b * kBlock; t < std::min(triangles.size(), (b + 1) * kBlock); ++t) {
+            const Box box = box_of(static_cast<int>(t));
+            extents[b].bounds.extend(box);
+            extents[b].sum += box.sizes().maxCoeff();
+        }
+    });
+    Extent all;
+    for (const Extent& extent : extents) {
+        all.bounds.extend(extent.bounds);
+        all.sum += extent.sum;
     }
     if (!triangles.empty()) {
-        low_ = bounds.min();
-        size_ = std::max(size_, 0.5 * sum / static_cast<double>(triangles.size()));
-        const auto counts = [&] { return (bounds.sizes() / size_).array().floor() + 1.0; };
+        low_ = all.bounds.min();
+        size_ = std::max(size_, 0.5 * all.sum / static_cast<double>(triangles.size()));
+        const auto counts = [&] { return (all.bounds.sizes() / size_).array().floor() + 1.0; };
         while (counts().prod() > kMostCubes * static_cast<double>(triangles.size()) + kSome) size_ *= 1.25;
         count_ = counts().cast<int>();
     }
-    first_.assign(static_cast<std::size_t>(count_.prod()) + 1, 0);
-    const auto for_each_cube = [&](int t, const auto& visit) {
-        const Range range = range_of(box_of(t));
-        for (int x = range.from.x(); x <= range.to.x(); ++x)
-            for (int y = range.from.y(); y <= range.to.y(); ++y)
-                for (int z = range.from.z(); z <= range.to.z(); ++z) visit(number(x, y, z));
+    const auto cubes = static_cast<std::size_t>(count_.prod());
+    std::vector<std::atomic<int>> next(cubes);  // how many, then where the next one goes
+    const auto for_each_cube = [&](const auto& visit) {
+        parallel_for_each(triangles.size(), kBlock, [&](std::size_t t) {
+            const Range range = range_of(box_of(static_cast<int>(t)));
+            for (int x = range.from.x(); x <= range.to.x(); ++x)
+                for (int y = range.from.y(); y <= range.to.y(); ++y)
+                    for (int z = range.from.z(); z <= range.to.z(); ++z)
+                        visit(static_cast<int>(t), number(x, y, z));
+        });
     };
-    for (int t = 0; t < static_cast<int>(triangles.size()); ++t)
-        for_each_cube(t, [&](std::size_t cube) { ++first_[cube]; });
-    int members = 0;
-    for (int& first : first_) first = members += first;  // the ends, from which they are filled
-    members_.resize(members);
-    for (int t = static_cast<int>(triangles.size()) - 1; t >= 0; --t)
-        for_each_cube(t, [&](std::size_t cube) { members_[--first_[cube]] = t; });
+    for_each_cube([&](int, std::size_t cube) { next[cube].fetch_add(1, std::memory_order_relaxed); });
+    first_.assign(cubes + 1, 0);
+    for (std::size_t cube = 0; cube < cubes; ++cube)
+        first_[cube + 1] = first_[cube] + next[cube].exchange(first_[cube], std::memory_order_relaxed);
+    members_.resize(first_.back());
+    for_each_cube(
+        [&](int t, std::size_t cube) { members_[next[cube].fetch_add(1, std::memory_order_relaxed)] = t; });
+    parallel_for_each(cubes, kBlock, [&](std::size_t cube) {
+        std::sort(members_.begin() + first_[cube], members_.begin() + first_[cube + 1]);
+    });
 }
 
 std::vector<int> TriangleBins::meeting(const Box& box) const {

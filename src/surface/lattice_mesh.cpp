@@ -1,18 +1,23 @@
 #include "surface/lattice_mesh.h"
 
-#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <tuple>
+#include <utility>
 
+#include "parallel_for_each.h"
 #include "surface/float_precision.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
+
+constexpr std::size_t kGrain = 1024;
 
 /// Where the lattice edge that the four cells around are common to crosses the surface. `cells`: their
 /// lowest corners. nullopt where they are not around an edge that does.
@@ -37,12 +42,12 @@ std::optional<Vec3> crossing_amid(const Vec3 (&cells)[4], const Eigen::Affine3d&
 
 /// Flags for the points that are not alone in their cell.
 std::vector<char> share_cells(const std::vector<Vec3>& points, const Eigen::Affine3d& to_lattice) {
-    std::vector<std::pair<std::array<int, 3>, int>> by_cell;
-    for (const Vec3& p : points) {
-        const Eigen::Array3i cell = (to_lattice * p).array().floor().cast<int>();
-        by_cell.push_back({{cell[0], cell[1], cell[2]}, static_cast<int>(by_cell.size())});
-    }
-    std::sort(by_cell.begin(), by_cell.end());
+    std::vector<std::pair<std::array<int, 3>, int>> by_cell(points.size());
+    parallel_for_each(points.size(), kGrain, [&](std::size_t p) {
+        const Eigen::Array3i cell = (to_lattice * points[p]).array().floor().cast<int>();
+        by_cell[p] = {{cell[0], cell[1], cell[2]}, static_cast<int>(p)};
+    });
+    tbb::parallel_sort(by_cell.begin(), by_cell.end());
     std::vector<char> result(points.size(), 0);
     for (std::size_t i = 1; i < by_cell.size(); ++i)
         if (by_cell[i].first == by_cell[i - 1].first)
@@ -59,15 +64,25 @@ struct CellEdge {
     }
 };
 
+/// Ascending.
 std::vector<CellEdge> cell_edges(const PolygonMesh& quadrangles) {
-    std::vector<CellEdge> result;
-    result.reserve(4 * quadrangles.quads.size());
-    for (std::size_t q = 0; q < quadrangles.quads.size(); ++q)
-        for (int k = 0; k < 4; ++k) {
-            const int a = quadrangles.quads[q][k], b = quadrangles.quads[q][(k + 1) % 4];
-            result.push_back({std::min(a, b), std::max(a, b), static_cast<int>(q), k});
-        }
-    std::sort(result.begin(), result.end());
+    const auto for_each_edge = [&](const auto& visit) {
+        for (std::size_t q = 0; q < quadrangles.quads.size(); ++q)
+            for (int k = 0; k < 4; ++k) {
+                const int a = quadrangles.quads[q][k], b = quadrangles.quads[q][(k + 1) % 4];
+                visit(CellEdge{std::min(a, b), std::max(a, b), static_cast<int>(q), k});
+            }
+    };
+    // By their lower corners, at each of which there are few.
+    std::vector<std::size_t> next(quadrangles.points.size() + 1, 0);
+    for_each_edge([&](const CellEdge& edge) { ++next[edge.low + 1]; });
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    std::vector<CellEdge> result(next.back());
+    for_each_edge([&](const CellEdge& edge) { result[next[edge.low]++] = edge; });
+    parallel_for_each(quadrangles.points.size(), kGrain, [&](std::size_t low) {
+        const auto begin = static_cast<std::ptrdiff_t>(low > 0 ? next[low - 1] : 0);
+        std::sort(result.begin() + begin, result.begin() + static_cast<std::ptrdiff_t>(next[low]));
+    });
     return result;
 }
 
@@ -75,11 +90,10 @@ std::vector<CellEdge> cell_edges(const PolygonMesh& quadrangles) {
 
 PolygonMesh quadrangles_near(const std::vector<Vec3>& places, double reach, const PolygonMesh& quadrangles) {
     std::vector<char> near(quadrangles.points.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, near.size(), 1024), [&](const auto& range) {
-        for (std::size_t v = range.begin(); v < range.end(); ++v)
-            near[v] = std::any_of(places.begin(), places.end(), [&](const Vec3& place) {
-                return (quadrangles.points[v] - place).lpNorm<Eigen::Infinity>() <= reach;
-            });
+    parallel_for_each(near.size(), kGrain, [&](std::size_t v) {
+        near[v] = std::any_of(places.begin(), places.end(), [&](const Vec3& place) {
+            return (quadrangles.points[v] - place).lpNorm<Eigen::Infinity>() <= reach;
+        });
     });
     PolygonMesh result;
     std::vector<int> number(near.size(), -1);
@@ -107,22 +121,17 @@ TriangleMesh lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surf
     TriangleMesh mesh;
     mesh.points = in_cell;
     mesh.points.resize(cells + quads);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells, 256), [&](const auto& range) {
-        Surface::Probe& probe = probes.local();
-        for (std::size_t v = range.begin(); v < range.end(); ++v)
-            if (const auto p = probe.project(in_cell[v]);
-                !shares_cell[v] && p && cell_of(*p) == cell_of(in_cell[v]))
-                mesh.points[v] = *p;
+    parallel_for_each(cells, kGrain, [&](std::size_t v) {
+        if (shares_cell[v]) return;
+        const auto p = probes.local().project(in_cell[v]);
+        if (p && cell_of(*p) == cell_of(in_cell[v])) mesh.points[v] = *p;
     });
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, quads, 256), [&](const auto& range) {
-        for (std::size_t q = range.begin(); q < range.end(); ++q) {
-            const auto& [i, j, k, l] = quadrangles.quads[q];
-            mesh.points[cells + q] =
-                crossing_amid(
-                    {cell_of(in_cell[i]), cell_of(in_cell[j]), cell_of(in_cell[k]), cell_of(in_cell[l])},
-                    lattice, surface.resolution(), probes.local())
-                    .value_or(0.25 * (in_cell[i] + in_cell[j] + in_cell[k] + in_cell[l]));
-        }
+    parallel_for_each(quads, kGrain, [&](std::size_t q) {
+        const auto& [i, j, k, l] = quadrangles.quads[q];
+        mesh.points[cells + q] = crossing_amid({cell_of(in_cell[i]), cell_of(in_cell[j]), cell_of(in_cell[k]),
+                                                cell_of(in_cell[l])},
+                                               lattice, surface.resolution(), probes.local())
+                                     .value_or(0.25 * (in_cell[i] + in_cell[j] + in_cell[k] + in_cell[l]));
     });
     // The two quadrangles of an edge are around crossings on one face of both cells; between these it passes.
     std::vector<std::array<int, 4>> on_face(quads);

@@ -1,16 +1,16 @@
 #include "isotrack/surface/level_set.h"
 
 #include <openvdb/tools/Count.h>
-#include <openvdb/tools/ValueTransformer.h>
-#include <openvdb/tools/VolumeToMesh.h>
 #include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <mutex>
 
 #include "component_boxes.h"
 #include "find_in_blocks.h"
@@ -103,6 +103,10 @@ struct LevelSet::Impl {
     CrossedEdges crossed;
     LeafTable leaves;
     Box bounds;
+
+    /// Of the whole lattice mesh, made when it is asked for.
+    const PolygonMesh& all_quadrangles() const;
+    bool has_quadrangles() const { return has_quadrangles_; }
 
     Impl(const openvdb::GridBase::ConstPtr& as_it_came, const LevelSetOptions& options)
         : map(*as_it_came), source(as_it_came) {
@@ -199,6 +203,11 @@ struct LevelSet::Impl {
         return floats ? floats->tree().isValueOn(c)
                       : openvdb::gridConstPtrCast<openvdb::DoubleGrid>(source)->tree().isValueOn(c);
     }
+
+private:
+    mutable std::once_flag once_;
+    mutable PolygonMesh quadrangles_;
+    mutable std::atomic<bool> has_quadrangles_ = false;
 };
 
 namespace {
@@ -360,19 +369,38 @@ std::optional<long> LevelSet::lattice_euler() const {
 std::optional<std::size_t> LevelSet::lattice_component_count() const {
     return count_components(impl_->crossed, impl_->grid->constTree());
 }
+namespace {
+
+/// volumeToMesh's, of values `off_node`; those of `grid` change.
+PolygonMesh quadrangles_of(FloatGrid& grid, float voxel_size) {
+    openvdb::tree::LeafManager<FloatTree>(grid.tree()).foreach ([&](auto& leaf, std::size_t) {
+        for (auto value = leaf.beginValueOn(); value; ++value) value.setValue(off_node(*value, voxel_size));
+    });
+    auto tile = grid.tree().beginValueOn();
+    for (tile.setMaxDepth(FloatTree::ValueOnIter::LEAF_DEPTH - 1); tile; ++tile)
+        tile.setValue(off_node(*tile, voxel_size));
+    return volume_to_polygons(grid, 0.0);
+}
+
+}  // namespace
+
+const PolygonMesh& LevelSet::Impl::all_quadrangles() const {
+    std::call_once(once_, [this] {
+        quadrangles_ = quadrangles_of(*grid->deepCopy(), static_cast<float>(map.voxel_size));
+        has_quadrangles_ = true;
+    });
+    return quadrangles_;
+}
 std::optional<std::vector<Box>> LevelSet::lattice_components() const {
-    std::vector<openvdb::Vec3s> points;
-    std::vector<openvdb::Vec4I> quads;
-    openvdb::tools::volumeToMesh(*impl_->grid, points, quads);
-    return component_boxes<4>(points, quads);
+    const PolygonMesh& all = impl_->all_quadrangles();
+    return component_boxes<4>(all.points, all.quads);
 }
 TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reach) const {
     // Around few places their nodes alone are looked at, and two more to each side.
     const Vec3 most = lattice().inverse().linear().cwiseAbs() * Vec3::Constant(reach) + Vec3::Constant(2.0);
-    FloatGrid::Ptr grid;
-    if (static_cast<double>(places.size()) * (2.0 * most + Vec3::Ones()).prod() <
-        kFewNodes * static_cast<double>(impl_->active_voxels)) {
-        grid = impl_->grid->copyWithNewTree();
+    if (!impl_->has_quadrangles() && static_cast<double>(places.size()) * (2.0 * most + Vec3::Ones()).prod() <
+                                         kFewNodes * static_cast<double>(impl_->active_voxels)) {
+        const FloatGrid::Ptr grid = impl_->grid->copyWithNewTree();
         auto to = grid->getAccessor();
         const auto from = impl_->grid->getConstAccessor();
         for (const Vec3& place : places) {
@@ -384,13 +412,10 @@ TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reac
             for (auto node = openvdb::CoordBBox(corner(-1.0), corner(1.0)).begin(); node; ++node)
                 to.setValue(*node, from.getValue(*node));
         }
-    } else {
-        grid = impl_->grid->deepCopy();
+        const PolygonMesh some = quadrangles_of(*grid, static_cast<float>(impl_->map.voxel_size));
+        return lattice_mesh_of(quadrangles_near(places, reach, some), *this);
     }
-    openvdb::tools::foreach (grid->beginValueOn(), [this](const FloatGrid::ValueOnIter& value) {
-        value.setValue(off_node(*value, static_cast<float>(impl_->map.voxel_size)));
-    });
-    return lattice_mesh_of(quadrangles_near(places, reach, volume_to_polygons(*grid, 0.0)), *this);
+    return lattice_mesh_of(quadrangles_near(places, reach, impl_->all_quadrangles()), *this);
 }
 
 std::vector<Surface::Diagonal> LevelSet::diagonals() const {

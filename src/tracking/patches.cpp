@@ -195,9 +195,10 @@ public:
             ++effort_.too_far;
             return false;
         }
+        if (!stays_manifold(*patch, bins)) return false;
         effort_.triangles += mesh.carved.triangles.size();
         FrameMesh other = patched(mesh, {&*patch});
-        if (!are_wanted(numbers_of(other)) || !is_sound(topology_of(other))) return false;
+        if (!are_wanted(numbers_of(other))) return false;
         if (has_flat_triangle(corners) || crosses(*patch, bins)) return std::nullopt;
         if (!try_mesh(std::move(other))) {
             ++effort_.refused;

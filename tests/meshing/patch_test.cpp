@@ -160,6 +160,51 @@ TriangleMesh coarse_cube(const Mat3& turn) {
     return mesh;
 }
 
+TEST(Patch, LeavesAManifoldWhereItsFansClose) {
+    const TriangleMesh sphere = support::icosphere(2);
+    const TriangleBins bins(sphere.points, sphere.triangles, 0.1);
+    Patch same;
+    same.gone = triangles_around({0, 0, 1}, 0.4, bins);
+    for (const int t : same.gone) same.triangles.push_back(sphere.triangles[t]);
+    ASSERT_GT(same.triangles.size(), 4u);
+    EXPECT_TRUE(stays_manifold(same, bins));
+    const auto is_sound = [&](const Patch& patch) {
+        const MeshTopology topology = mesh_topology(patched(sphere, patch));
+        return topology.closed() && topology.oriented() && topology.manifold();
+    };
+    const auto expect_no_manifold = [&](const Patch& patch) {
+        EXPECT_FALSE(stays_manifold(patch, bins));
+        EXPECT_FALSE(is_sound(patch));  // by an independent count
+    };
+    Patch open = same;
+    open.triangles.pop_back();
+    expect_no_manifold(open);
+    Patch turned = same;
+    std::swap(turned.triangles[0][1], turned.triangles[0][2]);
+    expect_no_manifold(turned);
+    Patch twice = same;
+    twice.triangles.push_back(twice.triangles[0]);
+    expect_no_manifold(twice);
+    // A tetrahedron that has one vertex in common with the rest, far from what goes.
+    Patch pinched = same;
+    const int first = static_cast<int>(sphere.points.size());
+    const int far =
+        static_cast<int>(std::min_element(sphere.points.begin(), sphere.points.end(),
+                                          [](const Vec3& a, const Vec3& b) { return a.z() < b.z(); }) -
+                         sphere.points.begin());
+    pinched.points = {{0, 0, -2}, {1, 0, -2}, {0, 1, -2}};
+    for (const Triangle& t : {Triangle{first, first + 1, first + 2}, Triangle{first, far, first + 1},
+                              Triangle{first + 1, far, first + 2}, Triangle{first + 2, far, first}})
+        pinched.triangles.push_back(t);
+    expect_no_manifold(pinched);
+    Patch apart = pinched;  // with vertices of its own
+    apart.points.push_back({0, 0, -3});
+    for (std::size_t t = same.triangles.size(); t < apart.triangles.size(); ++t)
+        std::replace(apart.triangles[t].begin(), apart.triangles[t].end(), far, first + 3);
+    EXPECT_TRUE(stays_manifold(apart, bins));
+    EXPECT_TRUE(is_sound(apart));
+}
+
 TEST(Patch, CrossesNothingAmongLargeTriangles) {
     const Mat3 turn = Eigen::AngleAxisd(0.4, Vec3(1, 2, 3).normalized()).toRotationMatrix();
     const TriangleMesh fine = fine_cube(turn), coarse = coarse_cube(turn);
