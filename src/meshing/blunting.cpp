@@ -144,7 +144,7 @@ bool BluntedMesh::may_have(const std::vector<Places>& candidates, const Replaced
 
 std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& except) const {
     std::vector<Triangle> result;
-    for (const int t : boxes->meeting(box))
+    for (const int t : boxes().meeting(box))
         if (!std::binary_search(except.begin(), except.end(), t)) result.push_back(triangles[t]);
     return result;
 }
@@ -189,12 +189,23 @@ bool Blunter::pass() {
     open_.assign(points_.size(), 0);
     if (sharp.empty()) return false;
     std::sort(sharp.begin(), sharp.end());
-    if (!boxes_ && -sharp.front().first > kSharpnessAt18Degrees)
-        boxes_ = std::make_unique<TriangleBoxes>(points_, triangles_);
-    BluntedMesh mesh{points_,   triangles_,   Corners(points_.size(), triangles_),
-                     movable_,  fixed_,       tolerance_,
-                     detail_,   reached_,     lost_,
-                     searched_, boxes_.get(), std::vector<char>(points_.size(), 0)};
+    BluntedMesh mesh{points_,
+                     triangles_,
+                     Corners(points_.size(), triangles_),
+                     movable_,
+                     fixed_,
+                     tolerance_,
+                     detail_,
+                     reached_,
+                     lost_,
+                     searched_,
+                     [this]() -> const TriangleBoxes& {
+                         std::call_once(made_boxes_, [this] {
+                             boxes_ = std::make_unique<TriangleBoxes>(points_, triangles_);
+                         });
+                         return *boxes_;
+                     },
+                     std::vector<char>(points_.size(), 0)};
     const std::size_t before = changes_.size();
     ThreadProbes probes(surface_);
     const auto look_at = [&](Look& look) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <optional>
 #include <set>
 #include <utility>
@@ -40,8 +41,8 @@ struct BluntedMesh {
     const std::set<std::pair<int, int>>&
         lost;                           ///< Edges, ascending, that may come back and are not to be made anew.
     const std::vector<char>& searched;  ///< Per triangle: in vain, as it is.
-    const TriangleBoxes* boxes;         ///< There when any triangle is below 18 degrees.
-    std::vector<char> touched;          ///< Per vertex: a change is near.
+    std::function<const TriangleBoxes&()> boxes;  ///< Made when they are asked for: few are.
+    std::vector<char> touched;                    ///< Per vertex: a change is near.
 
     double sharpness_of(const Triangle& t) const;
     double longest_edge_of(int triangle) const;

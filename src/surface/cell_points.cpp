@@ -177,6 +177,7 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
     constexpr std::size_t kBlock = 512;
     auto wanted = find_in_blocks<std::uint64_t>(
         some.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<std::uint64_t>& found) {
+            found.reserve(4 * (end - begin));
             for (std::size_t i = begin; i < end; ++i) {
                 const auto [low, axis, upward] = edges.edge_of(crossings_[some[i]]);
                 for (const double u : {0.0, 1.0})
@@ -187,22 +188,34 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
                         found.push_back(packed(cell));
                     }
             }
+            // Most are around several crossings of the block.
+            std::sort(found.begin(), found.end());
+            found.erase(std::unique(found.begin(), found.end()), found.end());
+            found.shrink_to_fit();
         });
     if (given_.empty())
         for (const Join& join : joins_) wanted.push_back(join.cell);
     tbb::parallel_sort(wanted.begin(), wanted.end());
     wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
     std::vector<std::uint64_t> fresh, all;
+    fresh.reserve(wanted.size());
     std::set_difference(wanted.begin(), wanted.end(), given_.begin(), given_.end(),
                         std::back_inserter(fresh));
+    wanted = {};
+    all.reserve(fresh.size() + given_.size());
     std::merge(fresh.begin(), fresh.end(), given_.begin(), given_.end(), std::back_inserter(all));
     given_ = std::move(all);
 
     constexpr double kRounding = 0.01;
     const Vec3 half = 0.5 * (1.0 + kRounding) * lattice_.linear().cwiseAbs().rowwise().sum();
-    return find_in_blocks<Surface::Crossing>(
+    // Nearly all cells have one part, which has a place from the start: there are many.
+    std::vector<Surface::Crossing> result;
+    result.reserve(fresh.size() + fresh.size() / 16);
+    result.resize(fresh.size());
+    const auto others = find_in_blocks<Surface::Crossing>(
         fresh.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<Surface::Crossing>& found) {
             Cell cell;
+            std::vector<Surface::Crossing> means;
             for (std::size_t i = begin; i < end; ++i) {
                 const Vec3 origin = unpacked(fresh[i]), middle = lattice_ * (origin.array() + 0.5).matrix();
                 cell.clear();
@@ -217,9 +230,19 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
                 auto join = std::lower_bound(joins_.begin(), joins_.end(), fresh[i],
                                              [](const Join& j, std::uint64_t c) { return j.cell < c; });
                 for (; join != joins_.end() && join->cell == fresh[i]; ++join) cell.join(join->corners);
-                cell.add_means(found);
+                means.clear();
+                cell.add_means(means);
+                result[i].stands_for = 0;  // none
+                if (means.empty()) continue;
+                result[i] = means.front();
+                found.insert(found.end(), means.begin() + 1, means.end());
             }
         });
+    result.erase(
+        std::remove_if(result.begin(), result.end(), [](const auto& point) { return point.stands_for == 0; }),
+        result.end());
+    result.insert(result.end(), others.begin(), others.end());
+    return result;
 }
 
 }  // namespace isotrack

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <utility>
@@ -74,6 +75,7 @@ private:
     long short_ones_left_;         // so many moves are still tried for triangles of less than half a detail
     std::vector<Blunting> changes_;
     std::set<std::pair<int, int>> lost_;  // edges that were flipped: taking that back brings them back
+    std::once_flag made_boxes_;
     std::unique_ptr<TriangleBoxes> boxes_;
 };
 
