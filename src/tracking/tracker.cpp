@@ -47,7 +47,9 @@ constexpr int kRounds = 2, kDenseRounds = 3;
 constexpr int kMendingSweeps = 3;
 constexpr int kMostMendings = 1;
 constexpr double kAstray = 0.125;  // of the particles: so many newborn at the end of the arrays are too many
-constexpr double kFew = 0.03;      // of the particles: few enough to be added by certify, without relaxation
+// Of the particles: few enough to be added by certify, without relaxation. More among those that are well
+// placed since a frame before.
+constexpr double kFew = 0.03, kFewAmongOld = 0.04;
 /// How fast the population goes after the wanted spacing.
 struct Pace {
     PopulationBand band;
@@ -452,6 +454,9 @@ bool Tracker::Impl::Making::is_thick() const {
 void Tracker::Impl::Making::mesh_particles() {
     Inspector& inspector = *work_.inspector;
     LastMesh& last_mesh = tracker_.last_mesh;
+    const std::vector<Id>& ids = particles().id;
+    const bool warm =
+        std::any_of(ids.begin(), ids.end(), [&](Id id) { return id < tracker_.first_of_frame; });
     for (int mending = 0;; ++mending) {
         inspector.restart();
         std::function<void()> measure_expected;
@@ -470,8 +475,13 @@ void Tracker::Impl::Making::mesh_particles() {
         densifier_.emplace(tracker_.make_densifier(work_.surface, work_.limits, work_.crossings->size()));
         added_ = mend();
         if (mending == kMostMendings ||
-            static_cast<double>(added_) < kFew * static_cast<double>(particles().size()))
+            static_cast<double>(added_) <
+                (warm ? kFewAmongOld : kFew) * static_cast<double>(particles().size()))
             break;
+        // What is known of this mesh has no use any more.
+        inspector.restart();
+        work_.inspection = {};
+        work_.mesh = {};
         tracker_.make_room(work_.surface, work_.frame);
     }
     // The last mesh is of no more use, and the most memory is needed now.
