@@ -135,7 +135,7 @@ std::optional<Proposal> nudge(const BluntedMesh& mesh, int triangle, Surface::Pr
         const Vec3 from = mesh.points[v];
         const double height = probe.value(from);
         const double lift = std::abs(height) > kFitted * mesh.tolerance ? kLift * mesh.tolerance : 0.0;
-        const Replaced replaced = mesh.replaced(star.triangle, probe);
+        std::optional<Replaced> replaced;  // when there is something to hold against it
         Vec3 way = goal - from;
         for (int halving = 0; halving <= kHalvings; ++halving, way *= 0.5) {
             const auto on_surface = probe.project(from + way);
@@ -144,7 +144,8 @@ std::optional<Proposal> nudge(const BluntedMesh& mesh, int triangle, Surface::Pr
             for (const double h : {height, height + lift, height - lift}) {
                 const Vec3 to = to_float_precision(*on_surface + h * n);
                 if (!(star.sharpness_at(to) < worth(before))) continue;
-                if (mesh.may_have(star.with(to), replaced, probe)) return move_of(v, star, to, mesh);
+                if (!replaced) replaced = mesh.replaced(star.triangle, probe);
+                if (mesh.may_have(star.with(to), *replaced, probe)) return move_of(v, star, to, mesh);
                 if (lift == 0.0) break;
             }
         }
@@ -159,12 +160,17 @@ std::optional<Proposal> search(const BluntedMesh& mesh, int triangle, Surface::P
     for (const int v : mesh.triangles[triangle]) {
         if (!mesh.movable[v] || mesh.touched[v]) continue;
         const Star star(v, mesh);
-        const Replaced before = mesh.replaced(star.triangle, probe);
-        const Vec3 reach = Vec3::Constant(star.mean_edge);
+        std::optional<Replaced> before;
         std::optional<Surroundings> others;
-        const auto crosses_others = [&](const Vec3& x) {
-            if (!others) others.emplace(star, Box(before.box.min() - reach, before.box.max() + reach), mesh);
-            return others->are_crossed(x);
+        const auto may_go_to = [&](const Vec3& x) {
+            // Most places are too far from the surface themselves.
+            if (std::abs(probe.farther_value(x)) > mesh.tolerance) return false;
+            if (!before) before = mesh.replaced(star.triangle, probe);
+            if (!mesh.may_have(star.with(x), *before, probe)) return false;
+            const Vec3 reach = Vec3::Constant(star.mean_edge);
+            if (!others)
+                others.emplace(star, Box(before->box.min() - reach, before->box.max() + reach), mesh);
+            return !others->are_crossed(x);
         };
         Vec3 best = mesh.points[v];
         double least = star.sharpness_at(best);
@@ -181,8 +187,7 @@ std::optional<Proposal> search(const BluntedMesh& mesh, int triangle, Surface::P
             std::sort(blunter.begin(), blunter.end(),
                       [](const auto& p, const auto& q) { return p.first < q.first; });
             const auto found = std::find_if(blunter.begin(), blunter.end(), [&](const auto& candidate) {
-                const Vec3& x = candidate.second;
-                return mesh.may_have(star.with(x), before, probe) && !crosses_others(x);
+                return may_go_to(candidate.second);
             });
             if (found == blunter.end())
                 step *= 0.5;
