@@ -80,22 +80,27 @@ Survey survey(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe
     const double along = steps / (c - a).norm(), across = steps / (b - a).norm();
     thread_local std::vector<double> values;  // there are many triangles
     values.clear();
-    for (int i = 0; i <= steps; ++i) {
-        const std::size_t row_before = steps + 2 - i;  // its length: so far back is what is next to a value
-        for (int j = 0; i + j <= steps; ++j) {
-            const double u = static_cast<double>(i) / steps, v = static_cast<double>(j) / steps;
-            const double value = probe.farther_value(a + u * (b - a) + v * (c - a));
-            error.mean_square += value * value;
-            if (value > outside.distance) outside = {u, v, value};
-            if (-value > inside.distance) inside = {u, v, -value};
-            const auto change_from = [&](std::size_t back) {
-                return std::abs(value - values[values.size() - back]);
-            };
-            if (i > 0) result.steepest = std::max(result.steepest, change_from(row_before) * across);
-            if (j > 0) result.steepest = std::max(result.steepest, change_from(1) * along);
-            values.push_back(value);
-        }
-    }
+    const auto for_each_point = [steps](const auto& visit) {
+        for (int i = 0; i <= steps; ++i)
+            for (int j = 0; i + j <= steps; ++j)
+                visit(i, j, static_cast<double>(i) / steps, static_cast<double>(j) / steps);
+    };
+    // All are read before any is looked at: where the grid is in no cache the processor waits for several at
+    // once then, until it has to know which of them is the largest.
+    for_each_point([&](int, int, double u, double v) {
+        values.push_back(probe.farther_value(a + u * (b - a) + v * (c - a)));
+    });
+    const double* next = values.data();
+    for_each_point([&](int i, int j, double u, double v) {
+        const double* const here = next++;
+        const double value = *here;
+        error.mean_square += value * value;
+        if (value > outside.distance) outside = {u, v, value};
+        if (-value > inside.distance) inside = {u, v, -value};
+        const int row_before = steps + 2 - i;  // its length: so far back is what is next to a value
+        if (i > 0) result.steepest = std::max(result.steepest, std::abs(value - here[-row_before]) * across);
+        if (j > 0) result.steepest = std::max(result.steepest, std::abs(value - here[-1]) * along);
+    });
     std::optional<TriangleQuadratic> quadratic;
     if (std::max(outside.distance, inside.distance) > refine_above && steps >= kFewestSteps &&
         steps <= kMostSteps)
