@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <queue>
@@ -80,6 +81,10 @@ public:
           keep_(particles.size(), 1),
           gone_(triangles.size(), 0),
           changed_(particles.size(), 0) {
+        std::vector<std::uint32_t> count(particles.size(), 0);  // first, so that lists need not grow
+        for (const Triangle& t : triangles)
+            for (const int v : t) ++count[v];
+        for (std::size_t v = 0; v < count.size(); ++v) around_[v].reserve(count[v]);
         for (std::size_t t = 0; t < triangles.size(); ++t)
             for (const int v : triangles[t]) around_[v].push_back(static_cast<int>(t));
     }
@@ -106,7 +111,7 @@ public:
         while (!queue.empty()) {
             const auto [q, i] = queue.top();
             queue.pop();
-            const double now = nearest_square(i);
+            const double now = changed_[i] ? nearest_square(i) : q;
             if (now != q) {  // a neighbour has gone
                 if (is_crowded(now)) queue.emplace(now, i);
                 continue;
