@@ -34,6 +34,13 @@ Vec3 unpacked(std::uint64_t cell) {
     return result;
 }
 
+/// The largest whole number that is not above x, as coordinates of cells are; inlined, which std::floor is
+/// only for newer processors.
+double whole_below(double x) {
+    const auto towards_zero = static_cast<double>(static_cast<std::int64_t>(x));
+    return towards_zero > x ? towards_zero - 1.0 : towards_zero;
+}
+
 /// Lattice crossings in lattice units.
 class LatticeEdges {
 public:
@@ -51,12 +58,13 @@ public:
         for (int other = 1; other < 3; ++other)
             if (std::abs(along_[other].dot(outward)) > std::abs(along_[axis].dot(outward))) axis = other;
         const Vec3 p = to_lattice_ * crossing.point;
-        Vec3 low = p.array().round();
+        Vec3 low;
+        for (int k = 0; k < 3; ++k) low[k] = whole_below(p[k] + 0.5);
         const bool upward = along_[axis].dot(outward) > 0.0;
         // At a node, which is outside as all are where the value is 0, the edge is the one that goes out to
         // it.
         const bool at_node = std::abs(p[axis] - low[axis]) < kAtNode;
-        low[axis] = at_node ? low[axis] - upward : std::floor(p[axis]);
+        low[axis] = at_node ? low[axis] - upward : whole_below(p[axis]);
         return {low, axis, upward};
     }
 
