@@ -30,47 +30,59 @@ struct Look {
     std::optional<Proposal> found;
 };
 
-/// Takes triangles out of a list in its order, as long as what is done about one is of no matter to another.
+/// Hands out triangles in their order, but later ones at once with earlier ones, as long as what is done
+/// about one is of no matter to another.
 class Independent {
 public:
-    explicit Independent(const BluntedMesh& mesh) : mesh_(mesh), claimed_(mesh.points.size(), 0) {}
+    Independent(std::vector<Sharp> sharp, const BluntedMesh& mesh)
+        : sharp_(std::move(sharp)), mesh_(mesh), claimed_(mesh.points.size(), 0) {}
 
-    std::vector<Sharp> take_from(std::vector<Sharp>& sharp) {
+    /// Empty when all were taken.
+    std::vector<Sharp> take() {
         ++round_;
-        std::vector<Sharp> taken, left;
-        for (std::size_t s = 0; s < sharp.size(); ++s) {
-            if (taken.size() == kMostAtOnce || left.size() == kMostPassedOver) {
-                left.insert(left.end(), sharp.begin() + static_cast<std::ptrdiff_t>(s), sharp.end());
-                break;
-            }
-            (is_claimed(sharp[s].second) ? left : taken).push_back(sharp[s]);
-            claim(sharp[s].second);
-        }
-        sharp = std::move(left);
+        std::vector<Sharp> taken, passed_over;
+        const auto consider = [&](const Sharp& one) {
+            (is_claimed(one.second) ? passed_over : taken).push_back(one);
+            claim(one.second);
+        };
+        for (const Sharp& one : waiting_) consider(one);
+        for (; next_ < sharp_.size() && taken.size() < kMostAtOnce && passed_over.size() < kMostWaiting;
+             ++next_)
+            consider(sharp_[next_]);
+        waiting_ = std::move(passed_over);
         return taken;
     }
 
 private:
-    static constexpr std::size_t kMostAtOnce = 64, kMostPassedOver = 256;
+    static constexpr std::size_t kMostAtOnce = 64, kMostWaiting = 256;
 
-    /// What may be touched for an earlier one are the vertices of the triangles around its corners; what has
-    /// to be as it was for this one are its own corners and those beyond its edges.
-    bool is_claimed(int triangle) const {
-        const Triangle& t = mesh_.triangles[triangle];
-        for (int k = 0; k < 3; ++k) {
-            const int beyond = mesh_.corners.beyond(t[(k + 1) % 3], t[k], mesh_.triangles).first;
-            if (claimed_[t[k]] == round_ || (beyond >= 0 && claimed_[beyond] == round_)) return true;
-        }
-        return false;
-    }
-    void claim(int triangle) {
+    /// Calls `visit` with the vertices of the triangles around a triangle's corners, among them all that may
+    /// be touched for it, until that returns true; returns whether.
+    template <typename Visit>
+    bool any_around(int triangle, const Visit& visit) const {
         const Corners& corners = mesh_.corners;
         for (const int v : mesh_.triangles[triangle])
             for (int e = corners.first[v]; e < corners.first[v + 1]; ++e)
-                for (const int w : mesh_.triangles[corners.corner[e] / 3]) claimed_[w] = round_;
+                for (const int w : mesh_.triangles[corners.corner[e] / 3])
+                    if (visit(w)) return true;
+        return false;
+    }
+    /// Where these of two triangles have none in common no triangle around what moves for one has a vertex
+    /// in common with what moves for the other.
+    bool is_claimed(int triangle) const {
+        return any_around(triangle, [&](int v) { return claimed_[v] == round_; });
+    }
+    void claim(int triangle) {
+        any_around(triangle, [&](int v) {
+            claimed_[v] = round_;
+            return false;
+        });
     }
 
+    const std::vector<Sharp> sharp_;
     const BluntedMesh& mesh_;
+    std::vector<Sharp> waiting_;  // passed over, before those from next_ on
+    std::size_t next_ = 0;
     std::vector<int> claimed_;  // in which round
     int round_ = 0;
 };
@@ -198,7 +210,6 @@ bool Blunter::pass() {
                      detail_,
                      reached_,
                      lost_,
-                     searched_,
                      [this]() -> const TriangleBoxes& {
                          std::call_once(made_boxes_, [this] {
                              boxes_ = std::make_unique<TriangleBoxes>(points_, triangles_);
@@ -222,10 +233,10 @@ bool Blunter::pass() {
         searched_[t] = !look.found && is_free;
     };
     // Sharpest first, but those beside each other have to be looked at in order, others may be at once.
-    Independent independent(mesh);
-    while (!sharp.empty()) {
+    Independent independent(std::move(sharp), mesh);
+    for (auto some = independent.take(); !some.empty(); some = independent.take()) {
         std::vector<Look> looks;
-        for (const auto& [sharpest, t] : independent.take_from(sharp)) {
+        for (const auto& [sharpest, t] : some) {
             const bool is_short = mesh.longest_edge_of(t) < kShort * detail_;
             looks.push_back({t, -sharpest, is_short, !is_short || short_ones_left_ > 0, std::nullopt});
             if (is_short) --short_ones_left_;  // unless it is flipped

@@ -1,4 +1,4 @@
-// The two ways to make a sharp triangle blunter.
+// The ways to make a sharp triangle blunter.
 #pragma once
 
 #include <algorithm>
@@ -39,8 +39,7 @@ struct BluntedMesh {
     double detail;  ///< What is smaller need not be looked at.
     const std::vector<const CrossingGrid*>& reached;
     const std::set<std::pair<int, int>>&
-        lost;                           ///< Edges, ascending, that may come back and are not to be made anew.
-    const std::vector<char>& searched;  ///< Per triangle: in vain, as it is.
+        lost;  ///< Edges, ascending, that may come back and are not to be made anew.
     std::function<const TriangleBoxes&()> boxes;  ///< Made when they are asked for: few are.
     std::vector<char> touched;                    ///< Per vertex: a change is near.
 

@@ -85,8 +85,7 @@ Survey survey(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe
             for (int j = 0; i + j <= steps; ++j)
                 visit(i, j, static_cast<double>(i) / steps, static_cast<double>(j) / steps);
     };
-    // All are read before any is looked at: where the grid is in no cache the processor waits for several at
-    // once then, until it has to know which of them is the largest.
+    // All are read first: a branch on the largest would make the processor wait for each that is in no cache.
     for_each_point([&](int, int, double u, double v) {
         values.push_back(probe.farther_value(a + u * (b - a) + v * (c - a)));
     });

@@ -445,7 +445,9 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
 
 bool stays_manifold(const Patch& patch, const TriangleBins& mesh) {
     std::vector<int> corners;
-    for (const Triangle& t : patch.triangles) corners.insert(corners.end(), t.begin(), t.end());
+    const auto add_corners = [&](const Triangle& t) { corners.insert(corners.end(), t.begin(), t.end()); };
+    for (const Triangle& t : patch.triangles) add_corners(t);
+    for (const int t : patch.gone) add_corners(mesh.triangles()[t]);
     std::sort(corners.begin(), corners.end());
     corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
     using Turn = std::array<int, 3>;  // around a vertex, from one neighbour to the next

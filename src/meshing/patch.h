@@ -50,15 +50,15 @@ private:
 /// Ascending.
 std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh);
 
-/// `gone`, ascending, with a border that is pinched nowhere, goes. The triangles of `source` that are nearest to them
-/// come, less a seam about as wide as its spacing; strips of triangles that face as the source does, if any
-/// do, fill the seam from each loop of the one border to one of the other, and what they cross of what comes
-/// is left out. nullopt where the loops do not match. The mesh must be closed and manifold, and so is what it
-/// becomes, but for edges that it may have twice; it may cross itself.
+/// `gone`, ascending, with a border that is pinched nowhere, goes. The triangles of `source` that are nearest
+/// to them come, less a seam about as wide as its spacing; strips of triangles that face as the source does,
+/// if any do, fill the seam from each loop of the one border to one of the other, and what they cross of what
+/// comes is left out. nullopt where the loops do not match. The mesh must be closed and manifold, and so is
+/// what it becomes, but for edges that it may have twice; it may cross itself.
 std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source);
 
-/// Whether a closed, oriented manifold stays one with a patch: around each of its vertices the triangles that
-/// come, and those that stay, are one closed fan.
+/// Whether a closed, oriented manifold stays one with a patch: around each vertex of what comes and of what
+/// goes, ascending, the triangles that come and those that stay are one closed fan, or there are none.
 bool stays_manifold(const Patch& patch, const TriangleBins& mesh);
 
 }  // namespace isotrack

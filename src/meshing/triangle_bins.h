@@ -12,8 +12,8 @@ namespace isotrack {
 /// In cubes of one size. Read-only, so threads may share it.
 class TriangleBins {
 public:
-    /// Both vectors must outlive it. Uses TBB inside. `size`: the least edge of a cube; more for large triangles, and so that
-    /// there are no more cubes than a few for each triangle.
+    /// Both vectors must outlive it. `size`: the least edge of a cube; more for large triangles, and so that
+    /// there are no more cubes than a few for each triangle. Uses TBB inside.
     TriangleBins(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles, double size);
 
     const std::vector<Vec3>& points() const { return points_; }

@@ -8,7 +8,7 @@
 
 namespace isotrack {
 
-/// Triangles by their bounding boxes. Not for concurrent use.
+/// Triangles by their bounding boxes. Threads may share `meeting`, but not `note`.
 class TriangleBoxes {
 public:
     /// Both must outlive it; after a triangle or a vertex of it changed `note` must be told.

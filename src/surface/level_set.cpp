@@ -4,6 +4,7 @@
 #include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -386,7 +387,9 @@ PolygonMesh quadrangles_of(FloatGrid& grid, float voxel_size) {
 
 const PolygonMesh& LevelSet::Impl::all_quadrangles() const {
     std::call_once(once_, [this] {
-        quadrangles_ = quadrangles_of(*grid->deepCopy(), static_cast<float>(map.voxel_size));
+        // Whoever makes them must not take up another task meanwhile that asks for them, too.
+        tbb::this_task_arena::isolate(
+            [this] { quadrangles_ = quadrangles_of(*grid->deepCopy(), static_cast<float>(map.voxel_size)); });
         has_quadrangles_ = true;
     });
     return quadrangles_;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "find_in_blocks.h"
+#include "meshing/triangle_box.h"
 #include "parallel_for_each.h"
 #include "tracking/failing.h"
 
@@ -53,6 +54,12 @@ std::vector<float> turns_at_vertices(const std::vector<Vec3>& vertices,
     return result;
 }
 
+Box box_along(const Triangle& t, const std::vector<Vec3>& vertices, double distance) {
+    const Box box = box_of(vertices, t);
+    const Vec3 reach = Vec3::Constant(distance);
+    return Box(box.min() - reach, box.max() + reach);
+}
+
 /// Flags for the vertices that are at some places, which floats hold.
 std::vector<char> flags_at(const std::vector<Eigen::Vector3f>& places, const std::vector<Vec3>& vertices) {
     using Place = std::array<float, 3>;
@@ -76,16 +83,13 @@ void BetweenCrossings::flag_at_folds(const std::vector<Triangle>& triangles, con
                                      Flags& at_fold) const {
     const double spacing = crossings_.spacing();
     const bool thinned_out = crossings_.thinned_out(surface_);
-    const Vec3 reach = Vec3::Constant(tolerance_);
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         const auto& [i, j, k] = triangles[t];
         const double turn = std::max({turns[i], turns[j], turns[k]});
         if (turn == 0.0) return;
         const double farther = thinned_out ? kFartherAtFolds : kFartherBetween * turn,
                      nearly = std::max(kNearlyAtFolds * tolerance_, tolerance_ - farther * spacing);
-        Box box;
-        for (const int v : triangles[t]) box.extend(vertices[v]);
-        crossings_.for_each_in(Box(box.min() - reach, box.max() + reach), [&](std::size_t c) {
+        crossings_.for_each_in(box_along(triangles[t], vertices, tolerance_), [&](std::size_t c) {
             if (at_crossings[c] > nearly) at_fold[c].store(1, std::memory_order_relaxed);
         });
     });
@@ -136,24 +140,21 @@ std::vector<Surface::Crossing> BetweenCrossings::points_near(const Changes& chan
                                                              const MeshDistances& at_crossings) {
     // Crossings whose distances changed are looked at; and since normals turned at the corners of what came,
     // those along the triangles there, which may be at a fold now.
-    const auto box_along = [&](const Triangle& t) {
-        const Vec3 reach = Vec3::Constant(tolerance_);
-        const Vec3 &a = vertices[t[0]], &b = vertices[t[1]], &c = vertices[t[2]];
-        return Box(a.cwiseMin(b).cwiseMin(c) - reach, a.cwiseMax(b).cwiseMax(c) + reach);
-    };
     std::vector<char> is_near(crossings_.size(), 0);
     for (const int c : changes.crossings) is_near[c] = 1;
     const std::vector<char> turned = flags_at(changes.corners, vertices);
     for (const Triangle& t : triangles)
         if (turned[t[0]] || turned[t[1]] || turned[t[2]])
-            crossings_.for_each_in(box_along(t), [&](std::size_t c) { is_near[c] = 1; });
+            crossings_.for_each_in(box_along(t, vertices, tolerance_),
+                                   [&](std::size_t c) { is_near[c] = 1; });
     std::vector<int> near;
     for (std::size_t c = 0; c < is_near.size(); ++c)
         if (is_near[c]) near.push_back(static_cast<int>(c));
     const std::vector<char> columns = crossings_.columns_of(near);
     std::vector<char> beside(triangles.size()), at(vertices.size(), 0);
-    parallel_for_each(triangles.size(), kGrain,
-                      [&](std::size_t t) { beside[t] = crossings_.meets(box_along(triangles[t]), columns); });
+    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
+        beside[t] = crossings_.meets(box_along(triangles[t], vertices, tolerance_), columns);
+    });
     std::vector<Triangle> some, around;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         if (!beside[t]) continue;

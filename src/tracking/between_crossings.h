@@ -35,7 +35,6 @@ public:
         std::size_t triangles = 0;             ///< So many came or went.
         std::vector<Eigen::Vector3f> corners;  ///< Of those that came.
         std::vector<int> crossings;            ///< Whose distances may be others, each at least once.
-        bool all = true;                       ///< Nothing is known of that.
     };
     /// The same of a mesh that differs by so much from the one looked at last.
     std::vector<Surface::Crossing> points_near(const Changes& changes, const std::vector<Vec3>& vertices,

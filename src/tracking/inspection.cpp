@@ -129,7 +129,7 @@ double Inspector::cutoff() const {
 
 void Inspector::restart() {
     expected_.reset();
-    facets_.clear();
+    facets_ = std::vector<Facet>();  // there are many
     errors_.reset();
     forget_distances();
     looked_at_topology_ = false;
@@ -259,17 +259,20 @@ Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     Inspection result;
     doubt(measure_errors(mesh, result), kVainSpacing, result);
     measured_ = true;
-    since_look_.triangles += changes_.came.size() + changes_.went.size();
-    for (const Facet& facet : changes_.came)
-        since_look_.corners.insert(since_look_.corners.end(), facet.corner.begin(), facet.corner.end());
+    if (since_look_) {
+        since_look_->triangles += changes_.came.size() + changes_.went.size();
+        auto& corners = since_look_->corners;
+        for (const Facet& facet : changes_.came)
+            corners.insert(corners.end(), facet.corner.begin(), facet.corner.end());
+    }
     if (!changes_.many)
         changes_.around = triangles_near_gone(changes_.went, kAroundChanges * cutoff(), mesh.vertices,
                                               mesh.carved.triangles);
     for (std::size_t d = 0; d < distances_.size(); ++d) {
         const auto changed = distances_[d].measure(mesh.vertices, mesh.carved.triangles, changes_);
-        if (d == 0 && !changed) since_look_.all = true;
-        if (d == 0 && changed)
-            since_look_.crossings.insert(since_look_.crossings.end(), changed->begin(), changed->end());
+        if (d == 0 && !changed) since_look_.reset();
+        if (d == 0 && since_look_)
+            since_look_->crossings.insert(since_look_->crossings.end(), changed->begin(), changed->end());
         take_missed(d, result);
     }
     return result;
@@ -308,13 +311,12 @@ void Inspector::look_between(const FrameMesh& mesh, Inspection& inspection) {
         if (!thins_out()) diagonals = sides_ ? sides_->diagonals() : surface_.diagonals();
         between_crossings_.emplace(surface_, crossings_, diagonals, limits_.tolerance);
     }
-    const bool all = since_look_.all || static_cast<double>(since_look_.triangles) >
-                                            kMany * static_cast<double>(mesh.carved.triangles.size());
+    const bool all = !since_look_ || static_cast<double>(since_look_->triangles) >
+                                         kMany * static_cast<double>(mesh.carved.triangles.size());
     auto points = all ? between_crossings_->points(mesh.vertices, mesh.carved.triangles, distances_.front())
-                      : between_crossings_->points_near(since_look_, mesh.vertices, mesh.carved.triangles,
+                      : between_crossings_->points_near(*since_look_, mesh.vertices, mesh.carved.triangles,
                                                         distances_.front());
-    since_look_ = {};
-    since_look_.all = false;
+    since_look_.emplace();
     if (!thins_out()) set_unreachable_aside(points);
     measure_between(points, mesh, inspection);
 }
@@ -338,7 +340,7 @@ std::vector<Surface::Crossing> Inspector::newly_missed(const Inspection& now,
 void Inspector::forget_distances() {
     for (MeshDistances& distances : distances_) distances.forget();
     measured_ = false;
-    since_look_ = {};
+    since_look_.reset();
     for (std::vector<int>& missed : missed_) missed.clear();
 }
 

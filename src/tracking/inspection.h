@@ -117,8 +117,8 @@ private:
     std::shared_ptr<const std::vector<TriangleError>> errors_;  // of each
     FacetChanges changes_;                                      // since the inspection before
     std::optional<BetweenCrossings> between_crossings_;
-    BetweenCrossings::Changes since_look_;  // between crossings
-    std::deque<CrossingGrid> between_;      // points between crossings, as they were found
+    std::optional<BetweenCrossings::Changes> since_look_;  // between crossings; none: not known
+    std::deque<CrossingGrid> between_;                     // points between crossings, as they were found
     std::vector<Surface::Crossing> unreachable_;
     std::deque<MeshDistances> distances_;   // to the facets: of the crossings, then of each of between_
     bool measured_ = false;                 // and kept up to date from then on

@@ -30,7 +30,7 @@ public:
     /// Distances as those of `crossing_distances`, with its `cutoff`. `points` must outlive it.
     MeshDistances(const CrossingGrid& points, double cutoff) : points_(points), cutoff_(cutoff) {}
 
-    void forget() { distances_.clear(); }
+    void forget() { distances_ = std::vector<float>(); }  // there are many
     /// `changes`: since the mesh measured last, if there is one, with the triangles within two cutoffs
     /// around. Returns the points whose distances may be others now, each at least once; nullopt: all.
     std::optional<std::vector<int>> measure(const std::vector<Vec3>& vertices,

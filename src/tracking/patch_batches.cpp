@@ -69,7 +69,9 @@ public:
             patches[p] = patch_for(apart[p], bins_, lattice_);
             if (!patches[p]) return;
             const std::vector<Vec3> corners = corners_of(*patches[p], trials_.mesh());
-            if (has_flat_triangle(corners) || !trials_.may_have(corners)) patches[p].reset();
+            if (has_flat_triangle(corners) || !trials_.may_have(corners) ||
+                !stays_manifold(*patches[p], bins_))
+                patches[p].reset();
         });
         for (std::size_t p = 0; p < patches.size(); ++p) {
             auto& patch = patches[p];
@@ -92,7 +94,7 @@ public:
                 c.is_out = count_within(c.box, outlook.newly_missed) > 0 ||
                            count_within(c.box, outlook.failing) >= count_within(c.box, failing);
             if (leave_out()) continue;
-            if (!is_sound(topology_of(other)) || !trials_.try_mesh(std::move(other))) break;
+            if (!trials_.try_mesh(std::move(other))) break;
             return candidates_.size();
         }
         return 0;

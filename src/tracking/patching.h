@@ -4,7 +4,6 @@
 #include <limits>
 #include <vector>
 
-#include "isotrack/meshing/mesh_topology.h"
 #include "meshing/patch.h"
 #include "tracking/frame_mesh.h"
 
@@ -30,9 +29,5 @@ struct MeshNumbers {
     bool operator==(const MeshNumbers& o) const { return components == o.components && euler == o.euler; }
 };
 MeshNumbers numbers_of(const FrameMesh& mesh);
-
-inline bool is_sound(const MeshTopology& topology) {
-    return topology.closed() && topology.oriented() && topology.manifold();
-}
 
 }  // namespace isotrack

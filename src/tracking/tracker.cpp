@@ -455,10 +455,10 @@ void Tracker::Impl::Making::mesh_particles() {
     Inspector& inspector = *work_.inspector;
     LastMesh& last_mesh = tracker_.last_mesh;
     const std::vector<Id>& ids = particles().id;
-    const bool warm =
-        std::any_of(ids.begin(), ids.end(), [&](Id id) { return id < tracker_.first_of_frame; });
+    const auto old =
+        std::count_if(ids.begin(), ids.end(), [&](Id id) { return id < tracker_.first_of_frame; });
+    const bool most_are_old = 2 * static_cast<std::size_t>(old) > ids.size();
     for (int mending = 0;; ++mending) {
-        inspector.restart();
         std::function<void()> measure_expected;
         if (!options().fit && !in_paper())
             measure_expected = inspector.expect(particles().position, last_mesh.triangles);
@@ -466,7 +466,6 @@ void Tracker::Impl::Making::mesh_particles() {
             if (measure_expected) measure_expected();
             if (!is_thick()) inspector.prepare_topology();
         });
-        fitted_ = {};
         make_mesh();
         const StageTimer timer(work_.frame.seconds, "certify");
         if (in_paper()) break;
@@ -476,11 +475,13 @@ void Tracker::Impl::Making::mesh_particles() {
         added_ = mend();
         if (mending == kMostMendings ||
             static_cast<double>(added_) <
-                (warm ? kFewAmongOld : kFew) * static_cast<double>(particles().size()))
+                (most_are_old ? kFewAmongOld : kFew) * static_cast<double>(particles().size()))
             break;
         // What is known of this mesh has no use any more.
-        inspector.restart();
         work_.inspection = {};
+        inspector.restart();
+        densifier_.reset();
+        fitted_ = {};
         work_.mesh = {};
         tracker_.make_room(work_.surface, work_.frame);
     }

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include "isotrack/compare/baselines.h"
 #include "isotrack/meshing/mesh_topology.h"
@@ -179,6 +180,13 @@ TEST(Patch, LeavesAManifoldWhereItsFansClose) {
     Patch open = same;
     open.triangles.pop_back();
     expect_no_manifold(open);
+    Patch nothing = same;
+    nothing.triangles.clear();
+    expect_no_manifold(nothing);
+    Patch all_goes = nothing;
+    all_goes.gone.resize(sphere.triangles.size());
+    std::iota(all_goes.gone.begin(), all_goes.gone.end(), 0);
+    EXPECT_TRUE(stays_manifold(all_goes, bins));
     Patch turned = same;
     std::swap(turned.triangles[0][1], turned.triangles[0][2]);
     expect_no_manifold(turned);

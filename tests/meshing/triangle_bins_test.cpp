@@ -2,6 +2,8 @@
 #include "meshing/triangle_bins.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <limits>
@@ -63,6 +65,23 @@ TEST_P(InTriangleBins, TheNearestIsFound) {
 }
 
 INSTANTIATE_TEST_SUITE_P(OfSize, InTriangleBins, ::testing::Values(1e-3, 0.1, 1.0, 100.0));
+
+TEST(TriangleBins, AreTheSameAtAnyNumberOfThreads) {
+    const TriangleMesh mesh = support::icosphere(6);  // of several blocks
+    std::vector<std::vector<int>> visited;
+    for (const std::size_t threads : {1, 4}) {
+        const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+        tbb::task_arena(static_cast<int>(threads)).execute([&] {
+            const TriangleBins bins(mesh.points, mesh.triangles, 0.3);
+            visited.emplace_back();
+            bins.for_each_near(
+                {0.5, 0.6, 0.7}, [&](int t) { visited.back().push_back(t); },
+                [](double distance) { return distance > 0.5; });
+        });
+    }
+    EXPECT_GT(visited[0].size(), 10000u);
+    EXPECT_EQ(visited[0], visited[1]);
+}
 
 TEST(TriangleBins, MayBeEmpty) {
     const TriangleMesh none;

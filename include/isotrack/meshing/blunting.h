@@ -71,7 +71,7 @@ private:
     double tolerance_, detail_;
     std::vector<char> open_;       // per vertex: triangles around it are to be looked at
     std::vector<char> unchecked_;  // per triangle: changed since crossings were looked for
-    std::vector<char> searched_;   // per triangle: see BluntedMesh
+    std::vector<char> searched_;   // per triangle: in vain, as it is
     long short_ones_left_;         // so many moves are still tried for triangles of less than half a detail
     std::vector<Blunting> changes_;
     std::set<std::pair<int, int>> lost_;  // edges that were flipped: taking that back brings them back
