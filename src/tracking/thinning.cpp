@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <limits>
 #include <queue>
@@ -13,6 +12,7 @@
 
 #include "find_in_blocks.h"
 #include "isotrack/meshing/certify.h"
+#include "meshing/corners.h"
 #include "meshing/sharpness.h"
 #include "meshing/stands_for.h"
 #include "sampling/metric.h"
@@ -77,17 +77,11 @@ public:
           surface_(surface),
           crossings_(crossings),
           limits_(limits),
-          around_(particles.size()),
+          corners_(particles.size(), triangles),
+          fan_(particles.size()),
           keep_(particles.size(), 1),
           gone_(triangles.size(), 0),
-          changed_(particles.size(), 0) {
-        std::vector<std::uint32_t> count(particles.size(), 0);  // first, so that lists need not grow
-        for (const Triangle& t : triangles)
-            for (const int v : t) ++count[v];
-        for (std::size_t v = 0; v < count.size(); ++v) around_[v].reserve(count[v]);
-        for (std::size_t t = 0; t < triangles.size(); ++t)
-            for (const int v : triangles[t]) around_[v].push_back(static_cast<int>(t));
-    }
+          changed_(particles.size(), 0) {}
 
     std::vector<char> run() {
         using Candidate = std::pair<double, int>;  // squared distance to the nearest, particle
@@ -130,22 +124,46 @@ private:
     bool is_crowded(double nearest_square) const {
         return nearest_square < limits_.crowded * limits_.crowded;
     }
+    /// Calls `visit` with each triangle of a particle, in ascending order, until that returns true; returns
+    /// whether.
+    template <typename Visit>
+    bool any_around(int i, const Visit& visit) const {
+        if (changed_[i]) return std::any_of(fan_[i].begin(), fan_[i].end(), visit);
+        for (int e = corners_.first[i]; e < corners_.first[i + 1]; ++e)
+            if (visit(corners_.corner[e] / 3)) return true;
+        return false;
+    }
+    template <typename Visit>
+    void for_each_around(int i, const Visit& visit) const {
+        any_around(i, [&](int t) {
+            visit(t);
+            return false;
+        });
+    }
+    /// A list of them, which may be changed from now on.
+    std::vector<int>& fan_of(int i) {
+        if (!changed_[i]) for_each_around(i, [&](int t) { fan_[i].push_back(t); });
+        changed_[i] = 1;
+        return fan_[i];
+    }
     double nearest_square(int i) const {
         const Metric own = metric_of(particles_, static_cast<std::size_t>(i));
         double least = kInfinite;
-        for (const int t : around_[i])
+        for_each_around(i, [&](int t) {
             for (const int j : triangles_[t]) {
                 if (j == i || !(particles_.normal[i].dot(particles_.normal[j]) > 0.0)) continue;
                 const Vec3 r = particles_.position[j] - particles_.position[i];
                 least = std::min(least, 0.5 * (own.square(r) +
                                                metric_of(particles_, static_cast<std::size_t>(j)).square(r)));
             }
+        });
         return least;
     }
 
     /// The vertices around one, in order, counter-clockwise; empty where its triangles are not one fan.
     std::vector<int> ring_around(int i) const {
-        const std::vector<int>& fan = around_[i];
+        std::vector<int> fan;
+        for_each_around(i, [&](int t) { fan.push_back(t); });
         const auto after = [&](int t, int steps) {
             const Triangle& corner = triangles_[t];
             const auto k = std::find(corner.begin(), corner.end(), i) - corner.begin();
@@ -181,7 +199,7 @@ private:
         const auto& at = particles_.position;
         std::vector<Triangle> closing = triangles_within(ring, at[i], at);
         double sharpest = kSharpnessAt30Degrees;
-        for (const int t : around_[i]) sharpest = std::max(sharpest, sharpness_of(triangles_[t]));
+        for_each_around(i, [&](int t) { sharpest = std::max(sharpest, sharpness_of(triangles_[t])); });
         const auto passes = [&](const Triangle& t) {
             if (!(sharpness_of(t) <= sharpest)) return false;
             const TriangleError error =
@@ -192,7 +210,7 @@ private:
         std::vector<FacingTriangle> before, after;
         Box box(at[i]);
         for (const int v : ring) box.extend(at[v]);
-        for (const int t : around_[i]) before.push_back(facing_triangle(triangles_[t]));
+        for_each_around(i, [&](int t) { before.push_back(facing_triangle(triangles_[t])); });
         for (const Triangle& t : closing) after.push_back(facing_triangle(t));
         if (!stand_for_same(crossings_, before, box, after, {}, limits_.reach)) closing.clear();
         return closing;
@@ -202,7 +220,7 @@ private:
     /// there already. Changes farther off than the ring of one decide.
     bool fits(const std::vector<Triangle>& closing, int gone) const {
         const auto share = [&](int v, int w) {
-            return std::any_of(around_[v].begin(), around_[v].end(), [&](int t) {
+            return any_around(v, [&](int t) {
                 const Triangle& corner = triangles_[t];
                 return std::find(corner.begin(), corner.end(), w) != corner.end() &&
                        std::find(corner.begin(), corner.end(), gone) == corner.end();
@@ -212,7 +230,9 @@ private:
         for (const Triangle& t : closing)
             for (int k = 0; k < 3; ++k) {
                 const int v = t[k], w = t[(k + 1) % 3];
-                if (around_[v].size() <= 3) return false;
+                int count = 0;
+                for_each_around(v, [&](int) { ++count; });
+                if (count <= 3) return false;
                 if (!edges.insert(std::minmax(v, w)).second && share(v, w)) return false;  // between two
             }
         return true;
@@ -220,18 +240,16 @@ private:
 
     void take_out(int i, const std::vector<Triangle>& closing) {
         keep_[i] = 0;
-        std::vector<int> fan;
-        fan.swap(around_[i]);
-        for (const int t : fan) {
+        const std::vector<int> around = fan_of(i);
+        for (const int t : around) {
             gone_[t] = 1;
             for (const int v : triangles_[t]) {
-                auto& own = around_[v];
+                auto& own = fan_of(v);
                 own.erase(std::remove(own.begin(), own.end(), t), own.end());
-                changed_[v] = 1;
             }
         }
         for (const Triangle& t : closing) {
-            for (const int v : t) around_[v].push_back(static_cast<int>(triangles_.size()));
+            for (const int v : t) fan_of(v).push_back(static_cast<int>(triangles_.size()));
             triangles_.push_back(t);
             gone_.push_back(0);
         }
@@ -242,10 +260,11 @@ private:
     const Surface& surface_;
     const CrossingGrid& crossings_;
     const ThinningLimits limits_;
-    std::vector<std::vector<int>> around_;  // triangles of each particle
-    std::vector<char> keep_;                // particles
-    std::vector<char> gone_;                // triangles
-    std::vector<char> changed_;             // particles: beside one that has gone
+    const Corners corners_;              // of the start
+    std::vector<std::vector<int>> fan_;  // the triangles of those that changed since
+    std::vector<char> keep_;             // particles
+    std::vector<char> gone_;             // triangles
+    std::vector<char> changed_;          // particles: beside one that has gone
 };
 
 }  // namespace
