@@ -47,9 +47,7 @@ constexpr int kRounds = 2, kDenseRounds = 3;
 constexpr int kMendingSweeps = 3;
 constexpr int kMostMendings = 1;
 constexpr double kAstray = 0.125;  // of the particles: so many newborn at the end of the arrays are too many
-// Of the particles: few enough to be added by certify, without relaxation. More among those that are well
-// placed since a frame before.
-constexpr double kFew = 0.03, kFewAmongOld = 0.04;
+constexpr double kFew = 0.03;      // of the particles: few enough to be added by certify, without relaxation
 /// How fast the population goes after the wanted spacing.
 struct Pace {
     PopulationBand band;
@@ -454,10 +452,6 @@ bool Tracker::Impl::Making::is_thick() const {
 void Tracker::Impl::Making::mesh_particles() {
     Inspector& inspector = *work_.inspector;
     LastMesh& last_mesh = tracker_.last_mesh;
-    const std::vector<Id>& ids = particles().id;
-    const auto old =
-        std::count_if(ids.begin(), ids.end(), [&](Id id) { return id < tracker_.first_of_frame; });
-    const bool most_are_old = 2 * static_cast<std::size_t>(old) > ids.size();
     for (int mending = 0;; ++mending) {
         std::function<void()> measure_expected;
         if (!options().fit && !in_paper())
@@ -474,8 +468,7 @@ void Tracker::Impl::Making::mesh_particles() {
         densifier_.emplace(tracker_.make_densifier(work_.surface, work_.limits, work_.crossings->size()));
         added_ = mend();
         if (mending == kMostMendings ||
-            static_cast<double>(added_) <
-                (most_are_old ? kFewAmongOld : kFew) * static_cast<double>(particles().size()))
+            static_cast<double>(added_) < kFew * static_cast<double>(particles().size()))
             break;
         // What is known of this mesh has no use any more.
         work_.inspection = {};
