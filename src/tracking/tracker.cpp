@@ -3,6 +3,7 @@
 #include <tbb/task_group.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <numeric>
@@ -21,6 +22,7 @@
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
 #include "meshing/sharpness.h"
+#include "parallel_for_each.h"
 #include "sampling/creases.h"
 #include "surface/float_precision.h"
 #include "tracking/carry.h"
@@ -354,17 +356,22 @@ void Tracker::Impl::follow(const Surface& surface, const CrossingGrid& crossings
 
 /// Those around triangles that are too sharp, the newborn, and those next to them.
 std::vector<char> Tracker::Impl::restless(double detail) const {
-    std::vector<char> result(particles.size());
+    constexpr std::size_t kGrain = 1024;
     const auto is_new = [&](int i) { return particles.id[i] >= first_of_frame; };
-    for (std::size_t i = 0; i < particles.size(); ++i) result[i] = is_new(static_cast<int>(i));
     const auto is_sharp = [&](const Triangle& t, double sharpness) {
         const auto& at = particles.position;
         return is_sharper(sharpness, at[t[0]], at[t[1]], at[t[2]]);
     };
-    for (const Triangle& t : last_mesh.triangles)
+    std::vector<std::atomic<char>> found(particles.size());  // by several threads
+    parallel_for_each(last_mesh.triangles.size(), kGrain, [&](std::size_t n) {
+        const Triangle& t = last_mesh.triangles[n];
         if (std::any_of(t.begin(), t.end(), is_new) || is_sharp(t, kSharpnessAt22Degrees) ||
             (is_sharp(t, kSharpnessAt31Degrees) && angles_matter(particles, t, detail)))
-            for (const int i : t) result[i] = 1;
+            for (const int i : t) found[i].store(1, std::memory_order_relaxed);
+    });
+    std::vector<char> result(found.begin(), found.end());
+    for (std::size_t i = 0; i < particles.size(); ++i)
+        if (is_new(static_cast<int>(i))) result[i] = 1;
     return result;
 }
 
