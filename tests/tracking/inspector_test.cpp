@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <set>
 #include <vector>
 
 #include "isotrack/surface/shapes.h"
@@ -107,6 +108,46 @@ TEST(Inspector, FindsTheSameBetweenCrossingsByWhatChanged) {
         found += expected.size();
     }
     EXPECT_GT(found, 20u);
+}
+
+TEST(Inspector, KnowsWhatChangedSinceItLookedBetweenCrossings) {
+    const auto box = shapes::box({0.01, 0.02, 0.03}, {1.0, 0.7, 0.45}, kResolution);
+    const CrossingGrid crossings(*box);
+    Carved carved(*box, 0.04);
+    carved.limits.tolerance = 0.06;
+    FrameMesh mesh = carved.mesh();
+    Inspector kept(*box, carved.limits, crossings), anew(*box, carved.limits, crossings);
+    const auto look = [&](Inspector& inspector) {
+        Inspection inspection = inspector.inspect_both_ways(mesh);
+        inspector.look_between(mesh, inspection);
+    };
+    const auto found_by = [](const Inspector& inspector) {
+        std::set<std::array<double, 3>> result;
+        for (const CrossingGrid& points : inspector.between())
+            for (std::size_t i = 0; i < points.size(); ++i) {
+                const Vec3 p = to_float_precision(points[i].point);
+                result.insert({p.x(), p.y(), p.z()});
+            }
+        return result;
+    };
+    look(kept);
+    look(anew);
+    const std::size_t at_first = found_by(kept).size();
+    EXPECT_EQ(found_by(kept), found_by(anew));
+    const std::size_t apart = mesh.vertices.size() / 7;
+    for (std::size_t v = 5; v + apart / 2 < mesh.vertices.size(); v += apart) {
+        // Two dents at places of their own, the first of which is there at the second inspection, too.
+        for (const std::size_t dent : {v, v + apart / 2}) {
+            Vec3& p = mesh.vertices[dent];
+            p = to_float_precision(p * (1.0 - 0.05 / p.norm()));
+            kept.inspect_both_ways(mesh);
+        }
+        look(kept);
+        anew.restart();  // all is looked at then
+        look(anew);
+        EXPECT_EQ(found_by(kept), found_by(anew)) << v;
+    }
+    EXPECT_GT(found_by(kept).size(), at_first + 20);
 }
 
 TEST(Facets, AreTheSameByTheirCornersWhereTheyHaveNoKey) {
