@@ -253,15 +253,11 @@ bool Blunter::pass() {
 }
 
 void Blunter::make(Proposal&& proposal, std::vector<char>& touched) {
-    auto& [change, after, to] = proposal;
+    auto& [change, after, lost, to] = proposal;
     if (change.vertex >= 0) {
         points_[change.vertex] = to;
     } else {
-        const Triangle &first = change.before[0], &second = change.before[1];
-        std::vector<int> common;
-        for (const int v : first)
-            if (std::find(second.begin(), second.end(), v) != second.end()) common.push_back(v);
-        lost_.insert(std::minmax(common[0], common[1]));
+        lost_.insert(lost);
         for (int i = 0; i < 2; ++i) triangles_[change.triangle[i]] = after[i];
     }
     for (const Triangle& t : change.before)

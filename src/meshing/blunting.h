@@ -61,8 +61,9 @@ private:
 /// A change that may be made while the vertices it is about are untouched.
 struct Proposal {
     Blunting change;
-    std::vector<Triangle> after;  ///< A flip's two triangles.
-    Vec3 to = Vec3::Zero();       ///< Where a vertex goes.
+    std::vector<Triangle> after;     ///< A flip's two triangles.
+    std::pair<int, int> lost{0, 0};  ///< The edge that it takes away, ascending.
+    Vec3 to = Vec3::Zero();          ///< Where a vertex goes.
 };
 
 /// The largest cotangent that makes a change of triangles with this one worth it: a tenth less, or as little

@@ -36,6 +36,7 @@ std::optional<Proposal> flip(const BluntedMesh& mesh, int triangle, double sharp
     result.change.triangle = {triangle, other};
     result.change.before = {old, triangles[other]};
     result.after = {first, second};
+    result.lost = std::minmax(b, c);
     return result;
 }
 

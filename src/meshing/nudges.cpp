@@ -78,7 +78,9 @@ Vec3 bluntest_place(const Star& star, const Vec3& from, const Vec3& normal) {
 }
 
 Proposal move_of(int v, const Star& star, const Vec3& to, const BluntedMesh& mesh) {
-    Proposal result{{star.triangle, {}, v, mesh.points[v]}, {}, to};
+    Proposal result;
+    result.change = {star.triangle, {}, v, mesh.points[v]};
+    result.to = to;
     for (const int t : star.triangle) result.change.before.push_back(mesh.triangles[t]);
     return result;
 }
