@@ -22,7 +22,8 @@ constexpr double kStill = 0.02;                 // of the spacing: one that move
 constexpr double kSlid = 0.1, kStayed = 0.002;  // of the spacing: how far somebody has slid off a crease
 constexpr double kLine = 0.03;       // second eigenvalue: a crease of 20 degrees through the middle
 constexpr double kSharpLine = 0.12;  // likewise, of 45 degrees
-constexpr double kCorner = 0.15;     // third: that of a cube has 0.2, a ball of two resolutions less than 0.1
+constexpr double kOfHalf = 0.25;  // of what all ways turn by at a crease: every second does by that at least
+constexpr double kCorner = 0.15;  // third: that of a cube has 0.2, a ball of two resolutions less than 0.1
 
 bool may_be_near_crease(const Particles& particles, Adjacency::Range neighbours, int i) {
     const double near = kNeighbourly * particles.spacing[i];
@@ -56,7 +57,12 @@ std::optional<Place> place_near(const Particles& particles, Adjacency::Range nei
     Mat3 normals = n * n.transpose();  // of the normal equations, for moves from p, as is the pull
     Vec3 pull = Vec3::Zero();
     double turned = 0.0;  // squared sines, whose mean no second eigenvalue is above
-    for (const auto& [cosine, sine] : ways_around()) {
+    const double wanted = least_line * static_cast<double>(ways_around().size() + 1);
+    for (std::size_t k = 0; k < ways_around().size(); ++k) {
+        const std::size_t half = ways_around().size() / 2;
+        // Beyond a crease half as far off as they are there is one of the first half at least.
+        if (k == half && reach <= 0.5 * around && turned < kOfHalf * wanted) return std::nullopt;
+        const auto& [cosine, sine] = ways_around()[k < half ? 2 * k : 2 * (k - half) + 1];
         const Vec3 to = around * (cosine * a + sine * b);
         const Surface::Sample f = probe.sample(p + to);
         const double slope = f.gradient.norm();
@@ -67,7 +73,7 @@ std::optional<Place> place_near(const Particles& particles, Adjacency::Range nei
         turned += 1.0 - m.dot(n) * m.dot(n);
     }
     const auto planes = static_cast<double>(ways_around().size() + 1);
-    if (!(turned > planes * least_line)) return std::nullopt;
+    if (!(turned > wanted)) return std::nullopt;
     const Eigen::SelfAdjointEigenSolver<Mat3> spread(normals / planes);
     const Vec3& values = spread.eigenvalues();  // ascending
     if (!(values[1] > least_line)) return std::nullopt;

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
@@ -200,13 +201,21 @@ private:
         std::vector<Triangle> closing = triangles_within(ring, at[i], at);
         double sharpest = kSharpnessAt30Degrees;
         for_each_around(i, [&](int t) { sharpest = std::max(sharpest, sharpness_of(triangles_[t])); });
+        // Most fail, and by the middle of a triangle most of those.
+        const auto is_blunt = [&](const Triangle& t) { return sharpness_of(t) <= sharpest; };
+        const auto has_near_middle = [&](const Triangle& t) {
+            const Vec3 middle = (at[t[0]] + at[t[1]] + at[t[2]]) / 3.0;
+            return std::abs(probe.farther_value(middle)) <= limits_.error;
+        };
         const auto passes = [&](const Triangle& t) {
-            if (!(sharpness_of(t) <= sharpest)) return false;
             const TriangleError error =
                 certified_error(at[t[0]], at[t[1]], at[t[2]], probe, limits_.detail, limits_.error);
             return error.largest <= limits_.error && error.turned_deg <= kMostTurnedDeg;
         };
-        if (closing.empty() || !std::all_of(closing.begin(), closing.end(), passes)) return {};
+        const auto all = [&](const auto& which) {
+            return std::all_of(closing.begin(), closing.end(), which);
+        };
+        if (closing.empty() || !all(is_blunt) || !all(has_near_middle) || !all(passes)) return {};
         std::vector<FacingTriangle> before, after;
         Box box(at[i]);
         for (const int v : ring) box.extend(at[v]);
