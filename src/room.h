@@ -6,12 +6,18 @@
 
 namespace isotrack {
 
-/// Room for one more entry; when there is none, for a sixteenth of what is there: a DT gains few particles at
-/// a time, for which twice the memory would be too much.
+/// Room for a sixteenth more than `size`: a DT gains few particles at a time, for which twice the memory would
+/// be too much.
+template <typename T>
+void reserve_with_slack(std::vector<T>& values, std::size_t size) {
+    constexpr std::size_t kSlack = 16;
+    if (values.capacity() <= size) values.reserve(size + size / kSlack + kSlack);
+}
+
+/// For one more entry.
 template <typename T>
 void ensure_room(std::vector<T>& values) {
-    constexpr std::size_t kSlack = 16;
-    if (values.size() == values.capacity()) values.reserve(values.size() + values.size() / kSlack + kSlack);
+    reserve_with_slack(values, values.size());
 }
 
 }  // namespace isotrack

@@ -252,7 +252,9 @@ void IncrementalDelaunay::arrange() {
     // One array after the other: with both twice a DT would take its most memory here.
     const std::size_t count = slots - free_.size();
     const auto move = [&](std::vector<std::array<int, 4>>& values, const auto& renamed) {
-        std::vector<std::array<int, 4>> result(count);
+        std::vector<std::array<int, 4>> result;
+        reserve_with_slack(result, count);
+        result.resize(count);
         for (std::size_t c = 0; c < slots; ++c)
             if (marks_[c] == kUnseen)
                 for (int k = 0; k < 4; ++k) result[number[c]][k] = renamed(values[c][k]);
