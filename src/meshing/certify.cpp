@@ -178,17 +178,16 @@ TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfa
 
 namespace {
 
-/// `error_of(a, b, c, probe)` of each triangle abc.
-template <typename ErrorOf>
+/// `take` gets the number of each triangle abc and `error_of(a, b, c, probe)`.
+template <typename ErrorOf, typename Take>
 void measure(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles, const Surface& surface,
-             const ErrorOf& error_of, std::vector<TriangleError>& errors) {
-    errors.resize(triangles.size());
+             const ErrorOf& error_of, const Take& take) {
     ThreadProbes probes(surface);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 64), [&](const auto& range) {
         Surface::Probe& probe = probes.local();
         for (std::size_t t = range.begin(); t < range.end(); ++t)
-            errors[t] =
-                error_of(points[triangles[t][0]], points[triangles[t][1]], points[triangles[t][2]], probe);
+            take(t,
+                 error_of(points[triangles[t][0]], points[triangles[t][1]], points[triangles[t][2]], probe));
     });
 }
 
@@ -197,27 +196,28 @@ void measure(const std::vector<Vec3>& points, const std::vector<Triangle>& trian
 std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
                                            const std::vector<Triangle>& triangles, const Surface& surface,
                                            int steps, double refine_above) {
-    std::vector<TriangleError> errors;
+    std::vector<TriangleError> errors(triangles.size());
     measure(
         points, triangles, surface, [&](auto&... at) { return triangle_error(at..., steps, refine_above); },
-        errors);
+        [&](std::size_t t, const TriangleError& error) { errors[t] = error; });
     return errors;
 }
 
 std::vector<TriangleError> certified_errors(const std::vector<Vec3>& points,
                                             const std::vector<Triangle>& triangles, const Surface& surface,
                                             double detail, double refine_above) {
-    std::vector<TriangleError> errors;
-    certified_errors(points, triangles, surface, detail, refine_above, errors);
+    std::vector<TriangleError> errors(triangles.size());
+    certify_each(points, triangles, surface, detail, refine_above,
+                 [&](std::size_t t, const TriangleError& error) { errors[t] = error; });
     return errors;
 }
 
-void certified_errors(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                      const Surface& surface, double detail, double refine_above,
-                      std::vector<TriangleError>& errors) {
+void certify_each(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                  const Surface& surface, double detail, double refine_above,
+                  const std::function<void(std::size_t, const TriangleError&)>& take) {
     measure(
         points, triangles, surface, [&](auto&... at) { return certified_error(at..., detail, refine_above); },
-        errors);
+        take);
 }
 
 std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell,

@@ -35,13 +35,20 @@ Box box_around(const std::vector<Surface::Crossing>& crossings) {
     return box;
 }
 
+Surface::CrossingSequence as_sequence(std::vector<Surface::Crossing> crossings) {
+    const std::size_t size = crossings.size();
+    return {size, [list = std::move(crossings)](std::size_t i) { return list[i]; }};
+}
+
 }  // namespace
 
-CrossingGrid::CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing)
-    : CrossingGrid(spacing, box_around(crossings),
-                   {crossings.size(), [&](std::size_t i) { return crossings[i]; }}) {}
+CrossingGrid::CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
+    : CrossingGrid(spacing, box_around(crossings), std::move(crossings)) {}
 
-CrossingGrid::CrossingGrid(double spacing, const Box& box, const Surface::CrossingSequence& crossings)
+CrossingGrid::CrossingGrid(double spacing, const Box& box, std::vector<Surface::Crossing>&& crossings)
+    : CrossingGrid(spacing, box, as_sequence(std::move(crossings))) {}
+
+CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequence crossings)
     : spacing_(spacing), width_(2.0 * spacing) {
     constexpr double kColumnsPerCrossing = 4.0;
     if (crossings.size == 0) return;
@@ -73,6 +80,7 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, const Surface::Crossi
             next[column_of(made[c].offset)].fetch_add(1, std::memory_order_relaxed);
         }
     });
+    crossings.at = nullptr;  // there are many
     for (std::size_t c = 0; c < columns; ++c) {
         first_[c + 1] = first_[c] + next[c].load(std::memory_order_relaxed);
         next[c].store(0, std::memory_order_relaxed);

@@ -7,11 +7,16 @@
 
 namespace isotrack {
 
+int facet_key(const CarvedSurface& carved, std::size_t triangle) {
+    const auto& [i, j, k] = carved.triangles[triangle];
+    const bool whole = carved.inside_cell[triangle] >= 0 && carved.particle[i] >= 0 &&
+                       carved.particle[j] >= 0 && carved.particle[k] >= 0;
+    return whole ? 4 * carved.inside_cell[triangle] + carved.inside_facet[triangle] : -1;
+}
+
 Facet MeshFacets::operator[](std::size_t triangle) const {
     const auto& [i, j, k] = carved_.triangles[triangle];
-    const bool whole = carved_.inside_cell[triangle] >= 0 && carved_.particle[i] >= 0 &&
-                       carved_.particle[j] >= 0 && carved_.particle[k] >= 0;
-    return {whole ? 4 * carved_.inside_cell[triangle] + carved_.inside_facet[triangle] : -1,
+    return {facet_key(carved_, triangle),
             {vertices_[i].cast<float>(), vertices_[j].cast<float>(), vertices_[k].cast<float>()}};
 }
 

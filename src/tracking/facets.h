@@ -8,10 +8,13 @@
 
 namespace isotrack {
 
-/// A triangle by the cell and facet it is, and where its corners are.
+/// The number of the cell and facet that a triangle is: ascending over a mesh but for halves of split
+/// triangles and those put in, which have -1.
+int facet_key(const CarvedSurface& carved, std::size_t triangle);
+
+/// A triangle by its `facet_key`, and where its corners are. With -1 it equals nothing; see `same_corners`.
 struct Facet {
-    int key;  ///< Ascending over a mesh but for halves of split triangles and those put in, which have -1 and
-              ///< equal nothing; see `same_corners`.
+    int key;
     std::array<Eigen::Vector3f, 3> corner;  ///< Vertices are rounded to floats before they are looked at.
     Box box() const {
         Box result;
@@ -37,13 +40,12 @@ private:
 };
 
 /// Calls `same` with the numbers of each facet that is in both, in `now` and in `before`; `came` with those
-/// only in `now`, and what they are, `went` with those only in `before`.
-template <typename Same, typename Came, typename Went>
-void compare(const MeshFacets& now, const std::vector<Facet>& before, const Same& same, const Came& came,
-             const Went& went) {
+/// only in `now`, and what they are, `went` with those only in `before`. Of facets with a key.
+template <typename Now, typename Before, typename Same, typename Came, typename Went>
+void compare(const Now& now, const Before& before, const Same& same, const Came& came, const Went& went) {
     std::size_t old = 0;
     for (std::size_t f = 0; f < now.size(); ++f) {
-        const Facet facet = now[f];
+        const auto facet = now[f];
         while (facet.key >= 0 && old < before.size() && before[old].key < facet.key) went(old++);
         if (old < before.size() && facet == before[old])
             same(f, old++);

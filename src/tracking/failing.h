@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "isotrack/meshing/certify.h"
 #include "isotrack/sampling/particles.h"
 #include "meshing/sharpness.h"
+#include "tracking/facet_error.h"
 
 namespace isotrack {
 
@@ -15,10 +15,10 @@ constexpr double kCertified = 0.97;  // of the tolerance: samples at other place
 // slope is less values are held to less.
 constexpr double kFullSlope = 0.975;
 
-inline bool is_too_far(const TriangleError& error, double tolerance) {
+inline bool is_too_far(const FacetError& error, double tolerance) {
     return error.largest > kCertified * tolerance;
 }
-inline bool is_turned(const TriangleError& error) {
+inline bool is_turned(const FacetError& error) {
     return error.turned_deg > kMostTurnedDeg;
 }
 

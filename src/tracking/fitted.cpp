@@ -1,9 +1,12 @@
 #include "tracking/fitted.h"
 
+#include <utility>
+
 #include "isotrack/meshing/fit.h"
 #include "isotrack/meshing/refit.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "surface/float_precision.h"
+#include "tracking/facets.h"
 
 namespace isotrack {
 namespace {
@@ -29,7 +32,13 @@ void Fitted::take(const FrameMesh& mesh, std::size_t particles) {
 void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface,
                           std::optional<double> tolerance) {
     auto& triangles = mesh.carved.triangles;
-    const MeshFacets facets(mesh.carved, mesh.on_surface);
+    std::vector<FacetOfParticles> facets;
+    facets.reserve(triangles.size());
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        const auto& [i, j, k] = triangles[t];
+        const auto& particle = mesh.carved.particle;
+        facets.push_back({facet_key(mesh.carved, t), {particle[i], particle[j], particle[k]}});
+    }
     std::vector<char> movable(mesh.vertices.size(), 0);
     std::vector<int> now(facets_.size(), -1);
     std::size_t known = 0;
@@ -39,11 +48,11 @@ void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface&
             now[old] = static_cast<int>(f);
             ++known;
         },
-        [&](std::size_t f, const Facet&) {
+        [&](std::size_t f, const FacetOfParticles&) {
             for (const int v : triangles[f]) movable[v] = 1;
         },
         [](std::size_t) {});
-    facets.write_to(facets_);
+    facets_ = std::move(facets);
     const std::vector<int> vertex = lone_vertices(mesh, particles);
     const std::vector<char> lone = lone_flags(mesh, vertex);
     const bool is_first = 2 * known < triangles.size();

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "isotrack/surface/surface.h"
-#include "tracking/facets.h"
 #include "tracking/frame_mesh.h"
 #include "tracking/kept_flips.h"
 
@@ -20,7 +19,7 @@ public:
     /// what is within two rings of where one differs from the last; the rest goes to where it was, with the
     /// same flips where all their triangles are there. A mesh of which more than half is new counts as the
     /// first. A flipped triangle keeps the cell and facet of the one in whose place it is. `particles`: how
-    /// many there are.
+    /// many there are; in all these meshes they are in the same places.
     void fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface,
                       std::optional<double> tolerance);
 
@@ -31,7 +30,14 @@ public:
 private:
     void take(const FrameMesh& mesh, std::size_t particles);
 
-    std::vector<Facet> facets_;   // before the fit
+    struct FacetOfParticles {
+        int key;  // `facet_key`
+        Triangle corner;
+        bool operator==(const FacetOfParticles& o) const {
+            return key >= 0 && key == o.key && corner == o.corner;
+        }
+    };
+    std::vector<FacetOfParticles> facets_;
     std::vector<Vec3> position_;  // per particle
     KeptFlips flips_;
 };

@@ -26,7 +26,7 @@ void FrameWork::blunt() {
     take_what_is_looked_at();
     std::vector<double> farthest_before;  // of each triangle
     farthest_before.reserve(inspection.errors->size());
-    for (const TriangleError& error : *inspection.errors) farthest_before.push_back(error.largest);
+    for (const FacetError& error : *inspection.errors) farthest_before.push_back(error.largest);
     const std::vector<Vec3> vertices_before = mesh.vertices;
     const std::vector<Triangle> triangles_before = mesh.carved.triangles;
     Blunter blunter(mesh.vertices, mesh.carved.triangles,
@@ -46,8 +46,8 @@ void FrameWork::blunt() {
             double limit = kCertified * limits.tolerance;
             for (const int t : change.triangle) limit = std::max(limit, farthest_before[t]);
             for (const int t : change.triangle)
-                if (const TriangleError& error = (*inspection.errors)[t]; error.largest > limit)
-                    places.push_back(error.where);
+                if (const FacetError& error = (*inspection.errors)[t]; error.largest > limit)
+                    places.push_back(error.where.cast<double>());
         }
         for (const auto& c : inspector->newly_missed(inspection, vertices_before, triangles_before))
             places.push_back(c.point);

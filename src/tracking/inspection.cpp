@@ -107,16 +107,6 @@ bool is_needle_even_fitted(const FrameMesh& mesh, const Particles& particles, st
 
 }  // namespace
 
-std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector<TriangleError>& errors,
-                                        std::size_t particles) {
-    std::vector<double> result(particles, -1.0);
-    for (std::size_t t = 0; t < errors.size(); ++t)
-        for (const int v : mesh.carved.triangles[t])
-            if (const int p = mesh.carved.particle[v]; p >= 0)
-                result[p] = std::max(result[p], errors[t].largest);
-    return result;
-}
-
 Inspector::Inspector(const Surface& surface, const SizingLimits& limits, const CrossingGrid& crossings)
     : surface_(surface), limits_(limits), crossings_(crossings) {
     distances_.emplace_back(crossings_, cutoff());
@@ -140,17 +130,24 @@ std::function<void()> Inspector::expect(const std::vector<Vec3>& particles,
     expected_.emplace().errors.resize(triangles.size());
     return [this, &particles, &triangles] {
         expected_->triangles = {particles.size(), triangles};
-        certified_errors(particles, expected_->triangles.triangles(), surface_, limits_.detail,
-                         kSuspect * limits_.tolerance, expected_->errors);
+        certify(particles, expected_->triangles.triangles(), expected_->errors);
     };
 }
 
-std::vector<TriangleError> Inspector::errors_of(const std::vector<Vec3>& vertices,
-                                                const std::vector<Triangle>& triangles) const {
-    return certified_errors(vertices, triangles, surface_, limits_.detail, kSuspect * limits_.tolerance);
+std::vector<FacetError> Inspector::errors_of(const std::vector<Vec3>& vertices,
+                                             const std::vector<Triangle>& triangles) const {
+    std::vector<FacetError> errors(triangles.size());
+    certify(vertices, triangles, errors);
+    return errors;
 }
 
-std::vector<TriangleError> Inspector::errors_of(const std::vector<Vec3>& corners) const {
+void Inspector::certify(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+                        std::vector<FacetError>& errors) const {
+    certify_each(vertices, triangles, surface_, limits_.detail, kSuspect * limits_.tolerance,
+                 [&](std::size_t t, const TriangleError& error) { errors[t] = error; });
+}
+
+std::vector<FacetError> Inspector::errors_of(const std::vector<Vec3>& corners) const {
     std::vector<Triangle> triangles;
     for (int c = 0; c < static_cast<int>(corners.size()); c += 3) triangles.push_back({c, c + 1, c + 2});
     return errors_of(corners, triangles);
@@ -159,7 +156,7 @@ std::vector<TriangleError> Inspector::errors_of(const std::vector<Vec3>& corners
 std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
     constexpr std::size_t kSame = ~std::size_t{0};
     const MeshFacets facets(mesh.carved, mesh.vertices);
-    std::vector<const TriangleError*> known(facets.size(), nullptr);
+    std::vector<const FacetError*> known(facets.size(), nullptr);
     std::vector<char> seen(facets.size(), 0);  // in the mesh before
     changes_ = {};
     const auto take_same = [&](std::size_t f, std::size_t old) {
@@ -204,9 +201,9 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
         if (!known[f]) fresh.push_back(from_least_corner(mesh.carved.triangles[f]));
     const auto errors = errors_of(mesh.vertices, fresh);
     auto next = errors.begin();
-    for (const TriangleError*& error : known)
+    for (const FacetError*& error : known)
         if (!error) error = &*next++;
-    const auto measured = std::make_shared<std::vector<TriangleError>>(facets.size());
+    const auto measured = std::make_shared<std::vector<FacetError>>(facets.size());
     std::vector<char> too_far(facets.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, facets.size(), 1024), [&](const auto& range) {
         for (std::size_t f = range.begin(); f < range.end(); ++f) {
@@ -217,8 +214,9 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     std::vector<Vec3> in_vain;
     const auto probe = surface_.probe();
     for (std::size_t f = 0; f < facets.size(); ++f)
-        if (too_far[f] && (seen[f] || !probe->project((*measured)[f].where)))
-            in_vain.push_back((*measured)[f].where);
+        if (const Vec3 where = (*measured)[f].where.cast<double>();
+            too_far[f] && (seen[f] || !probe->project(where)))
+            in_vain.push_back(where);
     errors_ = result.errors = measured;  // first: the errors before have no use any more
     expected_.reset();                   // vertices may move from now on
     facets.write_to(facets_);
@@ -296,10 +294,10 @@ void Inspector::set_unreachable_aside(std::vector<Surface::Crossing>& points) {
     compact(points, keep);
 }
 
-void Inspector::measure_between(const std::vector<Surface::Crossing>& points, const FrameMesh& mesh,
+void Inspector::measure_between(std::vector<Surface::Crossing> points, const FrameMesh& mesh,
                                 Inspection& inspection) {
     if (points.empty()) return;
-    between_.emplace_back(points, surface_.resolution());
+    between_.emplace_back(std::move(points), surface_.resolution());
     distances_.emplace_back(between_.back(), cutoff()).measure(mesh.vertices, mesh.carved.triangles, {});
     missed_.emplace_back();
     take_missed(missed_.size() - 1, inspection);
@@ -318,7 +316,7 @@ void Inspector::look_between(const FrameMesh& mesh, Inspection& inspection) {
                                                         distances_.front());
     since_look_.emplace();
     if (!thins_out()) set_unreachable_aside(points);
-    measure_between(points, mesh, inspection);
+    measure_between(std::move(points), mesh, inspection);
 }
 
 void Inspector::look_off_surface(const FrameMesh& mesh, Inspection& inspection) {
@@ -384,7 +382,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     const auto find_failing = [&](std::size_t begin, std::size_t end, std::vector<Failing>& found) {
         for (std::size_t t = begin; t < end; ++t) {
             const auto [corner, whole] = corners_of(carved, t);
-            const TriangleError& error = (*inspection.errors)[t];
+            const FacetError& error = (*inspection.errors)[t];
             if (is_too_far(error, limits.tolerance) || is_turned(error) ||
                 (whole && is_needle_even_fitted(mesh, particles, t, corner, limits.detail)))
                 found.push_back({t, std::nullopt});
@@ -412,7 +410,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             double h = limits.max_edge;
             for (const int p : corner)
                 if (p >= 0) h = std::min(h, particles.spacing[p]);
-            result.push_back({(*inspection.errors)[t].where, 0.7 * h});
+            result.push_back({(*inspection.errors)[t].where.cast<double>(), 0.7 * h});
         }
     }
     for (const auto& c : inspection.missed)
@@ -435,12 +433,12 @@ void report(const FrameMesh& mesh, const Inspection& inspection, const Surface& 
     double sum = 0.0, weight = 0.0;
     frame.max_error = inspection.farthest_crossing;
     for (std::size_t t = 0; t < inspection.errors->size(); ++t) {
-        const TriangleError& error = (*inspection.errors)[t];
+        const FacetError& error = (*inspection.errors)[t];
         const auto& [i, j, k] = mesh.carved.triangles[t];
         const double area =
             (mesh.vertices[j] - mesh.vertices[i]).cross(mesh.vertices[k] - mesh.vertices[i]).norm();
         frame.max_error = std::max(frame.max_error, error.largest / slope);
-        frame.most_turned_deg = std::max(frame.most_turned_deg, error.turned_deg);
+        frame.most_turned_deg = std::max<double>(frame.most_turned_deg, error.turned_deg);
         sum += area * error.mean_square / (slope * slope);
         weight += area;
     }

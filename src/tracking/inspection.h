@@ -1,6 +1,7 @@
 // One frame's mesh held against its surface, and what would mend it.
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "isotrack/sampling/sizing.h"
 #include "isotrack/tracking/tracker.h"
 #include "tracking/between_crossings.h"
+#include "tracking/facet_error.h"
 #include "tracking/facets.h"
 #include "tracking/frame_mesh.h"
 #include "tracking/mesh_distances.h"
@@ -29,7 +31,7 @@ struct Doubt {
 };
 
 struct Inspection {
-    std::shared_ptr<const std::vector<TriangleError>> errors;  ///< Per triangle; the inspector has them, too.
+    std::shared_ptr<const std::vector<FacetError>> errors;  ///< Per triangle; the inspector has them, too.
     /// Farther from the mesh than the tolerance: crossings, and points of the surface between such as are
     /// nearly so far off, at folds of the mesh, or in cells with an ambiguous face; see BetweenCrossings.
     std::vector<Surface::Crossing> missed;
@@ -42,8 +44,16 @@ struct Inspection {
 };
 
 /// The largest of `errors` (one per triangle) around each of so many particles; negative without a triangle.
-std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector<TriangleError>& errors,
-                                        std::size_t particles);
+template <typename Error>
+std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector<Error>& errors,
+                                        std::size_t particles) {
+    std::vector<double> result(particles, -1.0);
+    for (std::size_t t = 0; t < errors.size(); ++t)
+        for (const int v : mesh.carved.triangles[t])
+            if (const int p = mesh.carved.particle[v]; p >= 0)
+                result[p] = std::max(result[p], errors[t].largest);
+    return result;
+}
 
 /// Inspects the meshes of one frame, each a little different from the one before: what lies away from the
 /// triangles that changed is not measured again.
@@ -77,7 +87,7 @@ public:
                                                 const std::vector<Triangle>& triangles) const;
     /// As `inspect` finds them, of triangles of three corners each, from the corner with the least number on:
     /// their last digits depend on the order.
-    std::vector<TriangleError> errors_of(const std::vector<Vec3>& corners) const;
+    std::vector<FacetError> errors_of(const std::vector<Vec3>& corners) const;
     /// The points between crossings found so far.
     const std::deque<CrossingGrid>& between() const { return between_; }
     /// Whether some crossings stand for all: the tolerance is several resolutions.
@@ -89,8 +99,11 @@ public:
     void inspect_topology(const FrameMesh& mesh, Inspection& inspection);
 
 private:
-    std::vector<TriangleError> errors_of(const std::vector<Vec3>& vertices,
-                                         const std::vector<Triangle>& triangles) const;
+    std::vector<FacetError> errors_of(const std::vector<Vec3>& vertices,
+                                      const std::vector<Triangle>& triangles) const;
+    /// Into memory of the caller.
+    void certify(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+                 std::vector<FacetError>& errors) const;
     /// Measures the triangles that are not those of the mesh before. Returns what cannot be mended, or was
     /// not when it was seen last.
     std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
@@ -98,7 +111,7 @@ private:
     /// Means of crossings may be so far off the surface that a mesh with vertices on it is beyond the
     /// tolerance of them: those are set aside.
     void set_unreachable_aside(std::vector<Surface::Crossing>& points);
-    void measure_between(const std::vector<Surface::Crossing>& points, const FrameMesh& mesh,
+    void measure_between(std::vector<Surface::Crossing> points, const FrameMesh& mesh,
                          Inspection& inspection);
     void forget_distances();
     double cutoff() const;
@@ -110,12 +123,12 @@ private:
     const CrossingGrid& crossings_;
     struct Expected {
         TriangleIndex triangles;  // of particles
-        std::vector<TriangleError> errors;
+        std::vector<FacetError> errors;
     };
-    std::optional<Expected> expected_;                          // before the first inspection
-    std::vector<Facet> facets_;                                 // of the last inspection
-    std::shared_ptr<const std::vector<TriangleError>> errors_;  // of each
-    FacetChanges changes_;                                      // since the inspection before
+    std::optional<Expected> expected_;                       // before the first inspection
+    std::vector<Facet> facets_;                              // of the last inspection
+    std::shared_ptr<const std::vector<FacetError>> errors_;  // of each
+    FacetChanges changes_;                                   // since the inspection before
     std::optional<BetweenCrossings> between_crossings_;
     std::optional<BetweenCrossings::Changes> since_look_;  // between crossings; none: not known
     std::deque<CrossingGrid> between_;                     // points between crossings, as they were found

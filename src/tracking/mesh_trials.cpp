@@ -9,19 +9,19 @@
 namespace isotrack {
 namespace {
 
-double largest_of(const std::vector<TriangleError>& errors) {
+double largest_of(const std::vector<FacetError>& errors) {
     double result = 0.0;
-    for (const TriangleError& error : errors) result = std::max(result, error.largest);
+    for (const FacetError& error : errors) result = std::max(result, error.largest);
     return result;
 }
 
 std::vector<Vec3> failing_in(const Inspection& inspection, double tolerance) {
     std::vector<Vec3> result;
-    for (const TriangleError& error : *inspection.errors)
-        if (is_too_far(error, tolerance)) result.push_back(error.where);
+    for (const FacetError& error : *inspection.errors)
+        if (is_too_far(error, tolerance)) result.push_back(error.where.cast<double>());
     for (const Surface::Crossing& missed : inspection.missed) result.push_back(missed.point);
-    for (const TriangleError& error : *inspection.errors)
-        if (error.turned_deg >= kTurnedOverDeg) result.push_back(error.where);
+    for (const FacetError& error : *inspection.errors)
+        if (error.turned_deg >= kTurnedOverDeg) result.push_back(error.where.cast<double>());
     return result;
 }
 

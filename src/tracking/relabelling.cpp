@@ -22,12 +22,12 @@ std::size_t relabel(CellLabels& labels, const Tetrahedra& cells, const FrameMesh
     const auto probe = surface.probe();
     std::size_t changed = 0;
     for (std::size_t t = 0; t < inspection.errors->size(); ++t) {
-        const TriangleError& error = (*inspection.errors)[t];
+        const FacetError& error = (*inspection.errors)[t];
         const int inner = mesh.carved.inside_cell[t];
         if (!is_too_far(error, limits.tolerance) || inner == CarvedSurface::kNoCell ||
             is_flipped(mesh.carved, t, cells))
             continue;
-        const bool outside = probe->value(error.where) > 0.0;
+        const bool outside = probe->value(error.where.cast<double>()) > 0.0;
         const int wrong = outside ? inner : cells.neighbour(inner, mesh.carved.inside_facet[t]);
         if (cells.is_infinite(wrong) || labels[wrong] != static_cast<char>(outside)) continue;
         const double value = probe->value(centroid_of(wrong, cells, particles));

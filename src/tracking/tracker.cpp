@@ -467,6 +467,8 @@ void Tracker::Impl::Making::mesh_particles() {
             if (measure_expected) measure_expected();
             if (!is_thick()) inspector.prepare_topology();
         });
+        // The last mesh is of no more use, and the most memory is needed from now on.
+        last_mesh.take({}, particles().size());
         make_mesh();
         const StageTimer timer(work_.frame.seconds, "certify");
         if (in_paper()) break;
@@ -485,8 +487,6 @@ void Tracker::Impl::Making::mesh_particles() {
         work_.mesh = {};
         tracker_.make_room(work_.surface, work_.frame);
     }
-    // The last mesh is of no more use, and the most memory is needed now.
-    last_mesh.take({}, particles().size());
 }
 
 void Tracker::Impl::Making::insert_added() {

@@ -43,8 +43,8 @@ struct Carved : Samples {
     }
     Inspection inspect(const FrameMesh& mesh) const {
         Inspection result;
-        result.errors = std::make_shared<const std::vector<TriangleError>>(
-            triangle_errors(mesh.vertices, mesh.carved.triangles, surface, 6));
+        const auto errors = triangle_errors(mesh.vertices, mesh.carved.triangles, surface, 6);
+        result.errors = std::make_shared<const std::vector<FacetError>>(errors.begin(), errors.end());
         return result;
     }
     Vec3 centroid(int cell) const {

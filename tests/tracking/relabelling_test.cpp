@@ -87,7 +87,7 @@ void take_away_and_reach_out(const Surface& surface, char label) {
         EXPECT_TRUE(uses(after));
         EXPECT_TRUE(topology_of(after).closed() && topology_of(after).manifold());
         EXPECT_EQ(topology_of(after).euler, topology_of(before).euler);
-        for (const TriangleError& e : *carved.inspect(after).errors) EXPECT_LE(e.largest, tolerance);
+        for (const FacetError& e : *carved.inspect(after).errors) EXPECT_LE(e.largest, tolerance);
         ++reached;
     }
     EXPECT_GT(reached, 10);

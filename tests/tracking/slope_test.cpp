@@ -56,8 +56,8 @@ TEST(Slope, ReportsDistances) {
     mesh.vertices = {Vec3(0, 0, 1), Vec3(0.1, 0, 1), Vec3(0, 0.1, 1)};
     mesh.carved.triangles = {{0, 1, 2}};
     Inspection inspection;
-    inspection.errors = std::make_shared<std::vector<TriangleError>>(
-        1, TriangleError{0.01, 0.006 * 0.006, Vec3::Zero(), 0.0});
+    inspection.errors =
+        std::make_shared<std::vector<FacetError>>(1, TriangleError{0.01, 0.006 * 0.006, Vec3::Zero(), 0.0});
     for (const float share : {1.0f, 0.8f, 0.5f}) {
         TrackedFrame frame;
         frame.tolerance = 0.015;

@@ -1,6 +1,8 @@
 // Holding a mesh against the surface, both ways.
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -55,10 +57,10 @@ std::vector<TriangleError> triangle_errors(const std::vector<Vec3>& points,
 std::vector<TriangleError> certified_errors(const std::vector<Vec3>& points,
                                             const std::vector<Triangle>& triangles, const Surface& surface,
                                             double detail, double refine_above);
-/// Into memory of the caller.
-void certified_errors(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                      const Surface& surface, double detail, double refine_above,
-                      std::vector<TriangleError>& errors);
+/// Without a list: `take` is called with the number of each triangle and its error, by several threads.
+void certify_each(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                  const Surface& surface, double detail, double refine_above,
+                  const std::function<void(std::size_t, const TriangleError&)>& take);
 
 /// Where to put a particle that mends a facet of the boundary between inside and outside: the point of the
 /// surface at the same distance from the facet's three vertices, on the dual edge between the circumcentres

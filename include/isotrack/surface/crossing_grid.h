@@ -19,7 +19,7 @@ public:
         : CrossingGrid(std::max(surface.resolution(), apart), surface.bounds(),
                        surface.crossing_sequence(apart)) {}
     /// `spacing` of the crossings, world units. Few different directions, as those of a lattice.
-    CrossingGrid(const std::vector<Surface::Crossing>& crossings, double spacing);
+    CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing);
 
     std::size_t size() const { return entries_.size(); }
     bool empty() const { return entries_.empty(); }
@@ -72,7 +72,8 @@ public:
 
 private:
     /// `box`: around them.
-    CrossingGrid(double spacing, const Box& box, const Surface::CrossingSequence& crossings);
+    CrossingGrid(double spacing, const Box& box, std::vector<Surface::Crossing>&& crossings);
+    CrossingGrid(double spacing, const Box& box, Surface::CrossingSequence crossings);
 
     /// A crossing in 16 bytes: there are more of them than of all else.
     struct Entry {

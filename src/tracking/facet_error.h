@@ -1,0 +1,22 @@
+// The error of one triangle of a large mesh.
+#pragma once
+
+#include "isotrack/meshing/certify.h"
+
+namespace isotrack {
+
+/// A `TriangleError` in 32 bytes: there are two for each particle, and again two of another mesh.
+struct FacetError {
+    double largest = 0.0, mean_square = 0.0;
+    Eigen::Vector3f where = Eigen::Vector3f::Zero();
+    float turned_deg = 0.0f;
+
+    FacetError() = default;
+    FacetError(const TriangleError& error)
+        : largest(error.largest),
+          mean_square(error.mean_square),
+          where(error.where.cast<float>()),
+          turned_deg(static_cast<float>(error.turned_deg)) {}
+};
+
+}  // namespace isotrack
