@@ -205,14 +205,11 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
         for (const Join& join : joins_) wanted.push_back(join.cell);
     tbb::parallel_sort(wanted.begin(), wanted.end());
     wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
-    std::vector<std::uint64_t> fresh, all;
+    std::vector<std::uint64_t> fresh;
     fresh.reserve(wanted.size());
     std::set_difference(wanted.begin(), wanted.end(), given_.begin(), given_.end(),
                         std::back_inserter(fresh));
-    wanted = {};
-    all.reserve(fresh.size() + given_.size());
-    std::merge(fresh.begin(), fresh.end(), given_.begin(), given_.end(), std::back_inserter(all));
-    given_ = std::move(all);
+    wanted = std::vector<std::uint64_t>();  // there are many
 
     constexpr double kRounding = 0.01;
     const Vec3 half = 0.5 * (1.0 + kRounding) * lattice_.linear().cwiseAbs().rowwise().sum();
@@ -250,6 +247,13 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
         std::remove_if(result.begin(), result.end(), [](const auto& point) { return point.stands_for == 0; }),
         result.end());
     result.insert(result.end(), others.begin(), others.end());
+    if (given_.empty()) {
+        given_ = std::move(fresh);
+    } else {
+        const auto before = static_cast<std::ptrdiff_t>(given_.size());
+        given_.insert(given_.end(), fresh.begin(), fresh.end());
+        std::inplace_merge(given_.begin(), given_.begin() + before, given_.end());
+    }
     return result;
 }
 

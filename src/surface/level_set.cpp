@@ -322,7 +322,7 @@ Surface::CrossingSequence LevelSet::crossing_sequence(double apart) const {
         const std::size_t size = some.size();
         return {size, [&edges, crossing, chosen = std::move(some)](std::size_t i) {
                     Crossing result = crossing(edges[chosen[i].edge]);
-                    result.stands_for = chosen[i].stands_for;
+                    result.stands_for = static_cast<std::int16_t>(chosen[i].stands_for);
                     result.flat = chosen[i].flat;
                     return result;
                 }};

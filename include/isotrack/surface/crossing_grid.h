@@ -27,8 +27,8 @@ public:
     /// list.
     Surface::Crossing operator[](std::size_t i) const {
         const Entry& e = entries_[i];
-        return {origin_ + e.offset.cast<double>(), directions_[e.direction], static_cast<int>(e.stands_for),
-                e.flat != 0};
+        return {origin_ + e.offset.cast<double>(), directions_[e.direction],
+                static_cast<std::int16_t>(e.stands_for), e.flat != 0};
     }
     double spacing() const { return spacing_; }
     /// Whether some of a surface's crossings stand for all.

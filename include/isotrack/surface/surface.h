@@ -1,6 +1,7 @@
 // What the method knows of a surface: a value, a gradient, and the two operators made of them.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -87,10 +88,10 @@ public:
 
     /// Where an edge between neighbouring lattice nodes crosses the surface.
     struct Crossing {
-        Vec3 point;               ///< Linearly interpolated along the edge.
-        Eigen::Vector3f outward;  ///< Unit direction of the edge, from its end inside to its end outside.
-        int stands_for = 1;       ///< So many crossings, itself among them.
-        bool flat = false;        ///< The surface is a flat sheet where they are.
+        Vec3 point;                   ///< Linearly interpolated along the edge.
+        Eigen::Vector3f outward;      ///< Unit direction of the edge, from its end inside to its end outside.
+        std::int16_t stands_for = 1;  ///< So many crossings, itself among them.
+        bool flat = false;            ///< The surface is a flat sheet where they are.
     };
 
     /// Crossings that are made when they are asked for: a list of them would take more memory than all else.
