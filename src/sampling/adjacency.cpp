@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <numeric>
 #include <utility>
 
 #include "find_in_blocks.h"
@@ -12,30 +13,51 @@
 
 namespace isotrack {
 
+namespace {
+
+/// `list(i, found)`, called by several threads, appends the neighbours of i to the end of `found`, ascending.
+template <typename List>
+Adjacency from_lists(std::size_t count, const List& list) {
+    constexpr std::size_t kBlock = 1024;
+    Adjacency result;
+    result.first.resize(count + 1);
+    result.adjacent =
+        find_in_blocks<int>(count, kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
+            for (std::size_t i = begin; i < end; ++i) {
+                const std::size_t before = found.size();
+                list(i, found);
+                result.first[i + 1] = static_cast<int>(found.size() - before);
+            }
+        });
+    std::partial_sum(result.first.begin(), result.first.end(), result.first.begin());
+    return result;
+}
+
+}  // namespace
+
 Adjacency Adjacency::restricted(const std::vector<char>& keep) const {
     const std::vector<int> number = numbers_after(keep);
-    Adjacency result;
-    for (std::size_t i = 0; i < size(); ++i) {
-        if (!keep[i]) continue;
-        const std::size_t start = result.adjacent.size();
+    std::vector<int> kept;
+    for (std::size_t i = 0; i < size(); ++i)
+        if (keep[i]) kept.push_back(static_cast<int>(i));
+    return from_lists(kept.size(), [&](std::size_t n, std::vector<int>& found) {
+        const int i = kept[n];
+        const std::size_t start = found.size();
         bool bridged = false;
         for (const int j : of(i)) {
             if (keep[j]) {
-                result.adjacent.push_back(number[j]);
+                found.push_back(number[j]);
                 continue;
             }
             bridged = true;
             for (const int k : of(j))
-                if (keep[k] && k != static_cast<int>(i)) result.adjacent.push_back(number[k]);
+                if (keep[k] && k != i) found.push_back(number[k]);
         }
-        if (bridged) {
-            const auto from = result.adjacent.begin() + static_cast<std::ptrdiff_t>(start);
-            std::sort(from, result.adjacent.end());
-            result.adjacent.erase(std::unique(from, result.adjacent.end()), result.adjacent.end());
-        }
-        result.first.push_back(static_cast<int>(result.adjacent.size()));
-    }
-    return result;
+        if (!bridged) return;
+        const auto from = found.begin() + static_cast<std::ptrdiff_t>(start);
+        std::sort(from, found.end());
+        found.erase(std::unique(from, found.end()), found.end());
+    });
 }
 
 namespace {
@@ -87,51 +109,43 @@ Adjacency ring_of(const std::vector<std::array<int, 3>>& triangles, std::size_t 
 }
 
 Adjacency Adjacency::extended(const std::vector<std::array<int, 3>>& newborn, std::size_t count) const {
-    if (newborn.empty()) {
-        Adjacency result = *this;
-        result.first.resize(count + 1, result.first.back());
-        return result;
-    }
-    return gather(count, [&](const auto& visit) {
-        for (std::size_t i = 0; i < size(); ++i)
-            for (const int j : of(i)) visit(static_cast<int>(i), j);
-        for (std::size_t k = 0; k < newborn.size(); ++k)
-            for (const int j : newborn[k]) {
-                visit(static_cast<int>(size() + k), j);
-                visit(j, static_cast<int>(size() + k));
-            }
+    std::vector<std::pair<int, int>> links;  // from those there are to newborn ones
+    for (std::size_t k = 0; k < newborn.size(); ++k)
+        for (const int j : newborn[k]) links.emplace_back(j, static_cast<int>(size() + k));
+    const Adjacency added = from_pairs(links, size());
+    return from_lists(count, [&](std::size_t i, std::vector<int>& found) {
+        const auto append = [&](const auto& some) { found.insert(found.end(), some.begin(), some.end()); };
+        if (i < size()) {
+            append(of(i));
+            append(added.of(i));
+        } else if (i < size() + newborn.size()) {
+            std::array<int, 3> corners = newborn[i - size()];
+            std::sort(corners.begin(), corners.end());
+            append(corners);
+        }
     });
 }
 
 Adjacency Adjacency::squared(const std::vector<char>& some) const {
-    constexpr std::size_t kBlock = 1024;
-    Adjacency result;
-    result.first.resize(size() + 1);
     // Per thread: the particle whose list somebody was put on last.
     tbb::enumerable_thread_specific<std::vector<int>> listed_by([&] { return std::vector<int>(size(), -1); });
-    const auto find = [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
+    return from_lists(size(), [&](std::size_t i, std::vector<int>& found) {
+        if (!some.empty() && !some[i]) return;
         std::vector<int>& listed = listed_by.local();
-        for (std::size_t i = begin; i < end; ++i) {
-            if (!some.empty() && !some[i]) continue;
-            const std::size_t start = found.size();
-            const int self = static_cast<int>(i);
-            listed[i] = self;
-            const auto list = [&](int j) {
-                if (listed[j] == self) return;
-                listed[j] = self;
-                found.push_back(j);
-            };
-            for (const int j : of(i)) {
-                list(j);
-                for (const int k : of(j)) list(k);
-            }
-            std::sort(found.begin() + static_cast<std::ptrdiff_t>(start), found.end());
-            result.first[i + 1] = static_cast<int>(found.size() - start);
+        const std::size_t start = found.size();
+        const int self = static_cast<int>(i);
+        listed[i] = self;
+        const auto list = [&](int j) {
+            if (listed[j] == self) return;
+            listed[j] = self;
+            found.push_back(j);
+        };
+        for (const int j : of(i)) {
+            list(j);
+            for (const int k : of(j)) list(k);
         }
-    };
-    result.adjacent = find_in_blocks<int>(size(), kBlock, find);
-    for (std::size_t i = 0; i < size(); ++i) result.first[i + 1] += result.first[i];
-    return result;
+        std::sort(found.begin() + static_cast<std::ptrdiff_t>(start), found.end());
+    });
 }
 
 std::vector<std::vector<ParticleBlock>> colour_groups(const Adjacency& adjacency, int longest) {

@@ -4,12 +4,15 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "find_in_blocks.h"
+#include "parallel_for_each.h"
 #include "sampling/metric.h"
 #include "surface/float_precision.h"
 #include "surface/surface_near.h"
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 
@@ -103,20 +106,21 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
         return triangle.area2_16 > 0.0 ? -triangle.circumradius() : 0.0;
     };
     const auto large = smallest_first(triangles.size(), minus_radius, -band.sparse);
-    std::vector<char> touched(particles.size(), 0);
-    const auto probe = surface.probe();
-    std::vector<Triangle> parents;
-    for (const auto& [ratio, t] : large) {
-        const auto& [a, b, c] = triangles[t];
-        if (touched[a] || touched[b] || touched[c]) continue;
-        const MetricTriangle triangle(particles, triangles[t]);
+    struct Place {
+        Vec3 position, normal;
+    };
+    /// Where a particle would be born in a triangle, if nobody is near.
+    const auto place_in = [&](const Triangle& corner, Surface::Probe& probe) -> std::optional<Place> {
+        const auto& [a, b, c] = corner;
+        const MetricTriangle triangle(particles, corner);
         // An obtuse triangle has its circumcentre far outside: stay within one spacing.
         const Vec3 middle = triangle.middle(), to_centre = triangle.circumcentre() - middle;
         const double off = std::sqrt(triangle.square(to_centre));
-        const auto p = probe->project(middle + to_centre / std::max(1.0, off));
-        if (!p) continue;
-        const Vec3 n = probe->normal(*p);
-        if (!(n.dot(particles.normal[a] + particles.normal[b] + particles.normal[c]) > 0.0)) continue;
+        const auto p = probe.project(middle + to_centre / std::max(1.0, off));
+        if (!p) return std::nullopt;
+        const Vec3 n = probe.normal(*p);
+        if (!(n.dot(particles.normal[a] + particles.normal[b] + particles.normal[c]) > 0.0))
+            return std::nullopt;
         const auto is_near = [&](int j) {
             return n.dot(particles.normal[j]) > 0.0 &&
                    triangle.square(particles.position[j] - *p) < kEmpty * kEmpty;
@@ -125,19 +129,32 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
             const Adjacency::Range beside = ring.of(j);
             return is_near(j) || std::any_of(beside.begin(), beside.end(), is_near);
         };
-        if (std::any_of(triangles[t].begin(), triangles[t].end(), [&](int corner) {
-                const Adjacency::Range beside = ring.of(corner);
+        if (std::any_of(corner.begin(), corner.end(), [&](int v) {
+                const Adjacency::Range beside = ring.of(v);
                 return std::any_of(beside.begin(), beside.end(), any_near);
             }))
-            continue;
+            return std::nullopt;
+        return Place{*p, n};
+    };
+    ThreadProbes probes(surface);
+    std::vector<std::optional<Place>> places(large.size());
+    parallel_for_each(large.size(), 16, [&](std::size_t k) {
+        places[k] = place_in(triangles[large[k].second], probes.local());
+    });
+    std::vector<char> touched(particles.size(), 0);
+    std::vector<Triangle> parents;
+    for (std::size_t k = 0; k < large.size(); ++k) {
+        const Triangle& corner = triangles[large[k].second];
+        const auto& [a, b, c] = corner;
+        if (!places[k] || touched[a] || touched[b] || touched[c]) continue;
         const Vec3 velocity = (particles.velocity[a] + particles.velocity[b] + particles.velocity[c]) / 3.0;
         const double ha = particles.spacing[a], hb = particles.spacing[b], hc = particles.spacing[c];
         const double h =
             std::min((ha + hb + hc) / 3.0, std::max({ha, hb, hc}));  // rounding may not add to it
-        particles.add(*p, n, h, next_id++, velocity);
+        particles.add(places[k]->position, places[k]->normal, h, next_id++, velocity);
         particles.stretch.back() = particles.stretch[a];
         touched[a] = touched[b] = touched[c] = 1;
-        parents.push_back(triangles[t]);
+        parents.push_back(corner);
     }
     return parents;
 }

@@ -9,8 +9,7 @@
 namespace isotrack {
 
 /// Neighbours of every particle: those of i are adjacent[first[i]] to adjacent[first[i + 1] - 1], ascending.
-/// /// Symmetric, but for what `squared` of some makes.
-
+/// Symmetric, but for what `squared` of some makes.
 struct Adjacency {
     std::vector<int> first{0};
     std::vector<int> adjacent;
