@@ -11,13 +11,13 @@ namespace isotrack {
 template <typename T>
 void reserve_with_slack(std::vector<T>& values, std::size_t size) {
     constexpr std::size_t kSlack = 16;
-    if (values.capacity() <= size) values.reserve(size + size / kSlack + kSlack);
+    values.reserve(size + size / kSlack + kSlack);
 }
 
-/// For one more entry.
+/// Room for one more entry, and with slack where there is none.
 template <typename T>
 void ensure_room(std::vector<T>& values) {
-    reserve_with_slack(values, values.size());
+    if (values.size() == values.capacity()) reserve_with_slack(values, values.size());
 }
 
 }  // namespace isotrack

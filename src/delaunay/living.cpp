@@ -39,6 +39,7 @@ FacetKey facet_of(const std::array<int, 4>& v, int k) {
 }  // namespace
 
 void LivingDelaunay::assign(const std::vector<Vec3>& points, const std::vector<char>& there) {
+    dt_.points.clear();
     reserve_with_slack(dt_.points, points.size());
     dt_.points = points;
     there_ = there.empty() ? std::vector<char>(points.size(), 1) : there;

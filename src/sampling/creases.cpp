@@ -22,8 +22,10 @@ constexpr double kStill = 0.02;                 // of the spacing: one that move
 constexpr double kSlid = 0.1, kStayed = 0.002;  // of the spacing: how far somebody has slid off a crease
 constexpr double kLine = 0.03;       // second eigenvalue: a crease of 20 degrees through the middle
 constexpr double kSharpLine = 0.12;  // likewise, of 45 degrees
-constexpr double kOfHalf = 0.25;  // of what all ways turn by at a crease: every second does by that at least
-constexpr double kCorner = 0.15;  // third: that of a cube has 0.2, a ball of two resolutions less than 0.1
+constexpr double kCorner = 0.15;     // third: that of a cube has 0.2, a ball of two resolutions less than 0.1
+// Of what all ways turn by at a crease: beyond one that is half as far off as they are, or less, is every
+// third of them, and one at least of every second.
+constexpr double kOfHalf = 0.25;
 
 bool may_be_near_crease(const Particles& particles, Adjacency::Range neighbours, int i) {
     const double near = kNeighbourly * particles.spacing[i];
@@ -47,21 +49,26 @@ struct Place {
     Crease crease;
 };
 
-/// That within `reach` of particle i, if there is one, by the planes so far `around` it: where the second
-/// eigenvalue is no less than `least_line`.
-std::optional<Place> place_near(const Particles& particles, Adjacency::Range neighbours, int i, double reach,
-                                double around, double least_line, Surface::Probe& probe) {
+struct Search {
+    double reach, around;  // of places, and how far off the planes are that tell them; world units
+    double least_line;     // the second eigenvalue of a crease
+    double of_half;        // share of the least turn that half of the ways must have for more to be looked at
+};
+
+/// A place near particle i, if there is one.
+std::optional<Place> place_near(const Particles& particles, Adjacency::Range neighbours, int i,
+                                const Search& search, Surface::Probe& probe) {
+    const auto& [reach, around, least_line, of_half] = search;
     if (!may_be_near_crease(particles, neighbours, i)) return std::nullopt;
     const Vec3 p = particles.position[i], n = particles.normal[i];
     const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
     Mat3 normals = n * n.transpose();  // of the normal equations, for moves from p, as is the pull
     Vec3 pull = Vec3::Zero();
     double turned = 0.0;  // squared sines, whose mean no second eigenvalue is above
-    const double wanted = least_line * static_cast<double>(ways_around().size() + 1);
-    for (std::size_t k = 0; k < ways_around().size(); ++k) {
-        const std::size_t half = ways_around().size() / 2;
-        // Beyond a crease half as far off as they are there is one of the first half at least.
-        if (k == half && reach <= 0.5 * around && turned < kOfHalf * wanted) return std::nullopt;
+    const std::size_t half = ways_around().size() / 2;
+    const double planes = static_cast<double>(ways_around().size() + 1), wanted = planes * least_line;
+    for (std::size_t k = 0; k < 2 * half; ++k) {  // every second way, then those between
+        if (k == half && turned < of_half * wanted) return std::nullopt;
         const auto& [cosine, sine] = ways_around()[k < half ? 2 * k : 2 * (k - half) + 1];
         const Vec3 to = around * (cosine * a + sine * b);
         const Surface::Sample f = probe.sample(p + to);
@@ -72,7 +79,6 @@ std::optional<Place> place_near(const Particles& particles, Adjacency::Range nei
         pull += (m.dot(to) - f.value / slope) * m;
         turned += 1.0 - m.dot(n) * m.dot(n);
     }
-    const auto planes = static_cast<double>(ways_around().size() + 1);
     if (!(turned > wanted)) return std::nullopt;
     const Eigen::SelfAdjointEigenSolver<Mat3> spread(normals / planes);
     const Vec3& values = spread.eigenvalues();  // ascending
@@ -98,8 +104,8 @@ std::optional<Place> place_near(const Particles& particles, Adjacency::Range nei
 Crease pull_to_crease(Particles& particles, Adjacency::Range neighbours, int i, double resolution,
                       Surface::Probe& probe) {
     const double h = particles.spacing[i];
-    const auto place =
-        place_near(particles, neighbours, i, kReach * h, std::max(kReach * h, resolution), kLine, probe);
+    const auto place = place_near(particles, neighbours, i,
+                                  {kReach * h, std::max(kReach * h, resolution), kLine, 0.0}, probe);
     if (!place) return {};
     const bool stays = (place->position - particles.position[i]).norm() < kStill * h;
     if (!stays && is_taken(particles, neighbours, place->position, place->normal, kRoom * h)) return {};
@@ -113,8 +119,8 @@ void return_to_creases(Particles& particles, const Adjacency& adjacency, const S
     std::vector<std::optional<Place>> places(particles.size());
     parallel_for_each(particles.size(), 64, [&](std::size_t i) {
         const double h = particles.spacing[i], around = std::max(2.0 * kSlid * h, surface.resolution());
-        places[i] = place_near(particles, adjacency.of(i), static_cast<int>(i), kSlid * h, around, kSharpLine,
-                               probes.local());
+        places[i] = place_near(particles, adjacency.of(i), static_cast<int>(i),
+                               {kSlid * h, around, kSharpLine, kOfHalf}, probes.local());
     });
     for (std::size_t i = 0; i < particles.size(); ++i) {
         if (!places[i]) continue;

@@ -251,6 +251,7 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
         given_ = std::move(fresh);
     } else {
         const auto before = static_cast<std::ptrdiff_t>(given_.size());
+        given_.reserve(given_.size() + fresh.size());
         given_.insert(given_.end(), fresh.begin(), fresh.end());
         std::inplace_merge(given_.begin(), given_.begin() + before, given_.end());
     }

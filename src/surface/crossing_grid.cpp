@@ -35,18 +35,13 @@ Box box_around(const std::vector<Surface::Crossing>& crossings) {
     return box;
 }
 
-Surface::CrossingSequence as_sequence(std::vector<Surface::Crossing> crossings) {
-    const std::size_t size = crossings.size();
-    return {size, [list = std::move(crossings)](std::size_t i) { return list[i]; }};
-}
-
 }  // namespace
 
 CrossingGrid::CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
     : CrossingGrid(spacing, box_around(crossings), std::move(crossings)) {}
 
 CrossingGrid::CrossingGrid(double spacing, const Box& box, std::vector<Surface::Crossing>&& crossings)
-    : CrossingGrid(spacing, box, as_sequence(std::move(crossings))) {}
+    : CrossingGrid(spacing, box, Surface::CrossingSequence(std::move(crossings))) {}
 
 CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequence crossings)
     : spacing_(spacing), width_(2.0 * spacing) {
@@ -80,7 +75,7 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
             next[column_of(made[c].offset)].fetch_add(1, std::memory_order_relaxed);
         }
     });
-    crossings.at = nullptr;  // there are many
+    crossings.at = nullptr;  // which frees the list behind it, if there is one
     for (std::size_t c = 0; c < columns; ++c) {
         first_[c + 1] = first_[c] + next[c].load(std::memory_order_relaxed);
         next[c].store(0, std::memory_order_relaxed);

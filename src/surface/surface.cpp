@@ -77,8 +77,7 @@ Surface::CrossingSequence Surface::crossing_sequence(double) const {
                      result.push_back({from_lattice * (node + fraction * Vec3::Unit(axis)),
                                        (outward ? 1.0f : -1.0f) * Eigen::Vector3f::Unit(axis)});
                  });
-    const std::size_t size = result.size();
-    return {size, [list = std::move(result)](std::size_t i) { return list[i]; }};
+    return CrossingSequence(std::move(result));
 }
 
 std::vector<Surface::Crossing> Surface::crossings(double apart) const {

@@ -40,7 +40,8 @@ private:
 };
 
 /// Calls `same` with the numbers of each facet that is in both, in `now` and in `before`; `came` with those
-/// only in `now`, and what they are, `went` with those only in `before`. Of facets with a key.
+/// only in `now`, and what they are, `went` with those only in `before`. Of anything with a `facet_key`: both
+/// ascend by it but for those that have -1, which must equal nothing.
 template <typename Now, typename Before, typename Same, typename Came, typename Went>
 void compare(const Now& now, const Before& before, const Same& same, const Came& came, const Went& went) {
     std::size_t old = 0;

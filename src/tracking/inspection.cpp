@@ -130,19 +130,20 @@ std::function<void()> Inspector::expect(const std::vector<Vec3>& particles,
     expected_.emplace().errors.resize(triangles.size());
     return [this, &particles, &triangles] {
         expected_->triangles = {particles.size(), triangles};
-        certify(particles, expected_->triangles.triangles(), expected_->errors);
+        measure_into(expected_->errors, particles, expected_->triangles.triangles());
     };
 }
 
 std::vector<FacetError> Inspector::errors_of(const std::vector<Vec3>& vertices,
                                              const std::vector<Triangle>& triangles) const {
-    std::vector<FacetError> errors(triangles.size());
-    certify(vertices, triangles, errors);
+    std::vector<FacetError> errors;
+    measure_into(errors, vertices, triangles);
     return errors;
 }
 
-void Inspector::certify(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-                        std::vector<FacetError>& errors) const {
+void Inspector::measure_into(std::vector<FacetError>& errors, const std::vector<Vec3>& vertices,
+                             const std::vector<Triangle>& triangles) const {
+    errors.resize(triangles.size());
     certify_each(vertices, triangles, surface_, limits_.detail, kSuspect * limits_.tolerance,
                  [&](std::size_t t, const TriangleError& error) { errors[t] = error; });
 }

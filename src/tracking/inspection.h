@@ -101,9 +101,9 @@ public:
 private:
     std::vector<FacetError> errors_of(const std::vector<Vec3>& vertices,
                                       const std::vector<Triangle>& triangles) const;
-    /// Into memory of the caller.
-    void certify(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-                 std::vector<FacetError>& errors) const;
+    /// Into memory of the caller, as many as there are triangles.
+    void measure_into(std::vector<FacetError>& errors, const std::vector<Vec3>& vertices,
+                      const std::vector<Triangle>& triangles) const;
     /// Measures the triangles that are not those of the mesh before. Returns what cannot be mended, or was
     /// not when it was seen last.
     std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);

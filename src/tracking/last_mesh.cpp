@@ -86,7 +86,7 @@ void LastMesh::grow(std::size_t particles, const std::vector<Triangle>& parents)
         const int i = static_cast<int>(ring.size() + k);
         triangles.insert(triangles.end(), {{a, b, i}, {b, c, i}, {c, a, i}});
     }
-    ring = ring.extended(parents, particles);
+    if (ring.size() != particles) ring = ring.extended(parents, particles);
     evidence.error.resize(particles, -1.0);
     evidence.thickness.resize(particles, std::numeric_limits<double>::infinity());
 }

@@ -201,7 +201,7 @@ private:
         std::vector<Triangle> closing = triangles_within(ring, at[i], at);
         double sharpest = kSharpnessAt30Degrees;
         for_each_around(i, [&](int t) { sharpest = std::max(sharpest, sharpness_of(triangles_[t])); });
-        // Most fail, and by the middle of a triangle most of those.
+        // Most fail, and by the middle of a triangle, at which not all lattices look, most of those.
         const auto is_blunt = [&](const Triangle& t) { return sharpness_of(t) <= sharpest; };
         const auto has_near_middle = [&](const Triangle& t) {
             const Vec3 middle = (at[t[0]] + at[t[1]] + at[t[2]]) / 3.0;

@@ -589,6 +589,7 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     {
         const StageTimer timer(frame.seconds, "carry");
         if (astray()) arrange();
+        last_mesh.grow(particles.size());  // a frame that failed midway may have left it behind
         const std::vector<char> found = carry(particles, last_mesh.ring, surface, motion);
         particles.retain(found);
         last_mesh.retain(found);

@@ -80,6 +80,26 @@ TEST(ReturnToCreases, BringsBackWhoHasSlidOffALittle) {
         EXPECT_LT((particles.position[i] - wanted[i]).norm(), 1e-4) << particles.position[i].transpose();
 }
 
+TEST(ReturnToCreases, BringsBackHoweverTheCreaseLies) {
+    // Two planes through a line; around a particle they are looked at in some directions, past which a turn
+    // takes them.
+    constexpr double kDegree = 3.14159265358979323846 / 180.0;
+    for (const int between : {60, 70, 80})
+        for (int turn = 0; turn < 360; turn += 5) {
+            const Eigen::AngleAxisd motion(turn * kDegree, Vec3(1, 2, 3).normalized());
+            const Vec3 line = motion * Vec3(0, 0, 1), n = motion * Vec3(1, 0, 0),
+                       m = Eigen::AngleAxisd(between * kDegree, line) * n;
+            const auto wedge =
+                shapes::from_function([=](const Vec3& p) { return std::max(n.dot(p), m.dot(p)); },
+                                      Box(Vec3(-1, -1, -1), Vec3(1, 1, 1)), kResolution);
+            Particles particles;
+            particles.add(0.09 * kSpacing * line.cross(n) * -1.0, n, kSpacing, 0);
+            particles.add(0.5 * kSpacing * line.cross(m), m, kSpacing, 1);
+            return_to_creases(particles, from_pairs({{0, 1}, {1, 0}}, 2), *wedge);
+            EXPECT_LT(particles.position[0].norm(), 0.002 * kSpacing) << between << " " << turn;
+        }
+}
+
 TEST(ReturnToCreases, BringsNobodyNextToAnother) {
     const auto box = shapes::box({0, 0, 0}, {1, 1, 1}, kResolution);
     for (const double beside : {0.31, 0.4}) {

@@ -5,12 +5,16 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <map>
 #include <random>
 #include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "isotrack/error.h"
@@ -45,6 +49,38 @@ private:
         double value(const Vec3&) override { return 1.0; }
         Surface::Sample sample(const Vec3&) override { return {1.0, Vec3::Zero()}; }
     };
+};
+
+/// Another that cannot be read any more after so many values.
+class FailingSurface final : public Surface {
+public:
+    FailingSurface(SurfacePtr surface, long values) : surface_(std::move(surface)), left_(values) {}
+    std::unique_ptr<Surface::Probe> probe() const override { return std::make_unique<Failing>(*this); }
+    double resolution() const override { return surface_->resolution(); }
+    Box bounds() const override { return surface_->bounds(); }
+    /// Negative when it failed.
+    long values_left() const { return left_; }
+
+private:
+    struct Failing final : Surface::Probe {
+        explicit Failing(const FailingSurface& surface)
+            : Probe(1e-9, kVoxel), of(surface), probe(surface.surface_->probe()) {}
+        double value(const Vec3& p) override {
+            of.count();
+            return probe->value(p);
+        }
+        Surface::Sample sample(const Vec3& p) override {
+            of.count();
+            return probe->sample(p);
+        }
+        const FailingSurface& of;
+        std::unique_ptr<Surface::Probe> probe;
+    };
+    void count() const {
+        if (left_.fetch_sub(1) <= 0) throw std::runtime_error("the surface cannot be read");
+    }
+    SurfacePtr surface_;
+    mutable std::atomic<long> left_;
 };
 
 /// What is promised of every frame, whatever the surface.
@@ -623,6 +659,31 @@ TEST(Tracker, RefusesOptionsOutOfRange) {
     TrackerOptions most = with_tolerance(0.01);
     most.angle_deg = 90.0;
     EXPECT_NO_THROW(Tracker{most});
+}
+
+TEST(Tracker, GoesOnAfterAFrameThatFailedMidway) {
+    // Of a ring that grows: particles are added after it was meshed.
+    const auto ring = shapes::torus({0, 0, 0}, 1.0, 0.2, kVoxel),
+               grown = shapes::torus({0.02, 0, 0}, 1.1, 0.3, kVoxel);
+    constexpr long kMany = 1'000'000'000;
+    for (const bool fit : {false, true}) {
+        TrackerOptions options = with_tolerance(0.005);
+        options.fit = fit;
+        Tracker whole(options);
+        whole.advance(*ring);
+        const FailingSurface counted(grown, kMany);
+        whole.advance(counted);
+        const auto values = static_cast<double>(kMany - counted.values_left());
+        for (const double share : {0.1, 0.3, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99}) {
+            Tracker tracker(options);
+            tracker.advance(*ring);
+            EXPECT_THROW(tracker.advance(FailingSurface(grown, static_cast<long>(share * values))),
+                         std::runtime_error);
+            const TrackedFrame frame = tracker.advance(*grown);
+            expect_sound(frame, 1, 0, std::to_string(share));
+            EXPECT_TRUE(frame.within_tolerance) << share;
+        }
+    }
 }
 
 }  // namespace

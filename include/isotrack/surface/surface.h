@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "isotrack/types.h"
@@ -90,7 +91,7 @@ public:
     struct Crossing {
         Vec3 point;                   ///< Linearly interpolated along the edge.
         Eigen::Vector3f outward;      ///< Unit direction of the edge, from its end inside to its end outside.
-        std::int16_t stands_for = 1;  ///< So many crossings, itself among them.
+        std::int16_t stands_for = 1;  ///< So many crossings, itself among them: 32 767 at most.
         bool flat = false;            ///< The surface is a flat sheet where they are.
     };
 
@@ -99,6 +100,13 @@ public:
     struct CrossingSequence {
         std::size_t size = 0;
         std::function<Crossing(std::size_t)> at;  ///< Below `size`.
+
+        CrossingSequence() = default;
+        CrossingSequence(std::size_t count, std::function<Crossing(std::size_t)> make)
+            : size(count), at(std::move(make)) {}
+        /// Of a list that is there.
+        explicit CrossingSequence(std::vector<Crossing> list)
+            : size(list.size()), at([held = std::move(list)](std::size_t i) { return held[i]; }) {}
     };
     /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
     /// in the same order. Of those within a cube of an edge of about `apart` some along one axis may stand

@@ -114,7 +114,8 @@ public:
     /// Goes on to the next frame, or starts. Without `motion` the particles move as
     /// the surfaces themselves show, along them, too: from their last displacements on, each piece as rigidly
     /// as it can. An empty surface gives an empty mesh and drops all particles; the next surface with
-    /// something in it starts afresh, ids counting on.
+    /// something in it starts afresh, ids counting on. After a frame that failed, as when memory ran out or
+    /// the surface threw, the next goes on with the particles as they are then.
     TrackedFrame advance(const Surface& surface, const Motion& motion = {});
 
     /// What is left to do of a frame when its particles are final. To be called once, on any thread, beside
