@@ -67,9 +67,11 @@ std::optional<Place> place_near(const Particles& particles, Adjacency::Range nei
     double turned = 0.0;  // squared sines, whose mean no second eigenvalue is above
     const std::size_t half = ways_around().size() / 2;
     const double planes = static_cast<double>(ways_around().size() + 1), wanted = planes * least_line;
-    for (std::size_t k = 0; k < 2 * half; ++k) {  // every second way, then those between
+    for (std::size_t k = 0; k < 2 * half; ++k) {
         if (k == half && turned < of_half * wanted) return std::nullopt;
-        const auto& [cosine, sine] = ways_around()[k < half ? 2 * k : 2 * (k - half) + 1];
+        // Every second way first, then those between, where the first may do.
+        const std::size_t way = of_half == 0.0 ? k : k < half ? 2 * k : 2 * (k - half) + 1;
+        const auto& [cosine, sine] = ways_around()[way];
         const Vec3 to = around * (cosine * a + sine * b);
         const Surface::Sample f = probe.sample(p + to);
         const double slope = f.gradient.norm();
