@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Prints what a warm frame costs as the grid grows, with one thread and two, and as the mesh grows, and below each table the wanted
-# figures that are missed. The surface is a sphere with bumps that travel; a warm frame is the mean of the last two of four.
+# figures that are missed. The surface is a sphere with bumps that travel; a warm frame is the mean of the last two of four in
+# the first table, of the last six of eight in the others.
 # usage: scale.sh PROGRAM_DIR [--large] [VOXELS_PER_DIAGONAL...]
 # PROGRAM_DIR holds isotrack_scale. --large adds the row of 500 000 particles. Without VOXELS_PER_DIAGONAL: 256 512 1024 2048.
 set -euo pipefail
@@ -23,6 +24,9 @@ write() {
 # track OPTION...: names and values of the last frames into row.csv.
 track() {
     "$program" track "$work/frames" "$@" >"$work/row.csv"
+}
+track_six() {
+    track "$@" --measure 6
 }
 calculate() {
     LC_ALL=C awk "BEGIN { print $1 }"
@@ -83,10 +87,10 @@ size_for() {
 }
 
 echo
-size_for 25000
-track --tolerance "$tolerance" --threads 1
+size_for 25000 --frames 8
+track_six --tolerance "$tolerance" --threads 1
 cp "$work/row.csv" "$work/one.csv"
-track --tolerance "$tolerance" --threads 2
+track_six --tolerance "$tolerance" --threads 2
 sed 1d "$work/one.csv" >>"$work/row.csv"
 evaluate '
     function row(text, key,    times) {
@@ -113,10 +117,10 @@ echo "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
 sizes="5000 16000 50000 160000"
 [ "$large" = 0 ] || sizes="$sizes 500000"
 for size in $sizes; do
-    size_for "$size"
-    track --tolerance "$tolerance"
+    size_for "$size" --frames 8
+    track_six --tolerance "$tolerance"
     cp "$work/row.csv" "$work/plain.csv"
-    track --tolerance "$tolerance" --fit  # a row of other columns
+    track_six --tolerance "$tolerance" --fit  # a row of other columns
     cat "$work/plain.csv" "$work/row.csv" >"$work/both.csv"
     mv "$work/both.csv" "$work/row.csv"
     evaluate -v tolerance="$(calculate "$tolerance / $voxel")" '
@@ -150,11 +154,11 @@ sphere_row() {
                    1e6 * value["advance"] / value["particles"], 1e6 * value["delaunay"] / value["particles"]
         }'
 }
-size_for 16000
-track --tolerance "$tolerance"
+size_for 16000 --frames 8
+track_six --tolerance "$tolerance"
 sphere_row "sphere with bumps"
-write --voxel "$voxel" --perfect
-track --tolerance "$(calculate "$tolerance / 8.4")"
+write --voxel "$voxel" --perfect --frames 8
+track_six --tolerance "$(calculate "$tolerance / 8.4")"
 sphere_row "perfect sphere"
 
 echo
