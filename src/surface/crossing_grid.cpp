@@ -37,11 +37,9 @@ Box box_around(const std::vector<Surface::Crossing>& crossings) {
 
 }  // namespace
 
+// In braces, from left to right: the box is of a list that is still there.
 CrossingGrid::CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
-    : CrossingGrid(spacing, box_around(crossings), std::move(crossings)) {}
-
-CrossingGrid::CrossingGrid(double spacing, const Box& box, std::vector<Surface::Crossing>&& crossings)
-    : CrossingGrid(spacing, box, Surface::CrossingSequence(std::move(crossings))) {}
+    : CrossingGrid{spacing, box_around(crossings), Surface::CrossingSequence(std::move(crossings))} {}
 
 CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequence crossings)
     : spacing_(spacing), width_(2.0 * spacing) {

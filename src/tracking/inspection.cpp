@@ -214,10 +214,11 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     });
     std::vector<Vec3> in_vain;
     const auto probe = surface_.probe();
-    for (std::size_t f = 0; f < facets.size(); ++f)
-        if (const Vec3 where = (*measured)[f].where.cast<double>();
-            too_far[f] && (seen[f] || !probe->project(where)))
-            in_vain.push_back(where);
+    for (std::size_t f = 0; f < facets.size(); ++f) {
+        if (!too_far[f]) continue;
+        const Vec3 where = (*measured)[f].where.cast<double>();
+        if (seen[f] || !probe->project(where)) in_vain.push_back(where);
+    }
     errors_ = result.errors = measured;  // first: the errors before have no use any more
     expected_.reset();                   // vertices may move from now on
     facets.write_to(facets_);

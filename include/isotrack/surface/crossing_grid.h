@@ -72,8 +72,6 @@ public:
 
 private:
     /// `box`: around them.
-    /// Moves from the list when its box is known: arguments are evaluated in any order.
-    CrossingGrid(double spacing, const Box& box, std::vector<Surface::Crossing>&& crossings);
     CrossingGrid(double spacing, const Box& box, Surface::CrossingSequence crossings);
 
     /// A crossing in 16 bytes: there are more of them than of all else.
