@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdint>
 #include <limits>
-#include <memory>
 #include <optional>
 
 #include "delaunay/circumcentre.h"
 #include "meshing/triangle_distance.h"
 #include "meshing/triangle_quadratic.h"
+#include "parallel_for_each.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -308,87 +307,53 @@ double FacingTriangle::squared_distance(const Surface::Crossing& crossing, doubl
 
 namespace {
 
-/// The distances of those in `some`; of all crossings when it is null.
-void measure_crossings(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                       const CrossingGrid& grid, const std::vector<int>* some, double cutoff,
-                       std::vector<float>& distances) {
-    const std::size_t count = some ? some->size() : grid.size();
-    std::vector<char> wanted(grid.size(), !some);
-    const std::unique_ptr<int[]> number(some ? new int[grid.size()] : nullptr);  // of those among `some`
-    const auto crossing = [&](std::size_t u) { return some ? (*some)[u] : static_cast<int>(u); };
-    const auto place = [&](std::size_t c) { return some ? static_cast<std::size_t>(number[c]) : c; };
-    std::vector<LeastSquare> least(count);
-    for (std::size_t u = 0; some && u < count; ++u) {
-        wanted[(*some)[u]] = 1;
-        number[(*some)[u]] = static_cast<int>(u);
-    }
-    const auto for_each_block = [](std::size_t size, const auto& body) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size, 64), [&](const auto& range) {
-            for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
-        });
-    };
-    const auto box_around = [&](const Triangle& t, double reach) {
-        const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-        return Box((a.cwiseMin(b).cwiseMin(c).array() - reach).matrix(),
-                   (a.cwiseMax(b).cwiseMax(c).array() + reach).matrix());
-    };
-    const auto search = [&](const std::vector<Triangle>& near, const std::vector<char>* columns,
-                            double reach) {
-        for_each_block(near.size(), [&](std::size_t t) {
-            std::optional<FacingTriangle> triangle;  // most are far from all that is wanted when little is
-            const auto measure = [&](std::size_t c) {
-                if (!wanted[c]) return;
-                const auto& [i, j, k] = near[t];
-                if (!triangle) triangle.emplace(points[i], points[j], points[k]);
-                LeastSquare& found = least[place(c)];
-                found.take(triangle->squared_distance(grid[c], std::min(reach * reach, found.get())));
-            };
-            grid.for_each_in(box_around(near[t], reach), measure, columns);
-        });
-        std::vector<int> left;
-        for (std::size_t u = 0; u < count; ++u) {
-            wanted[crossing(u)] = least[u].get() > reach * reach;
-            if (wanted[crossing(u)]) left.push_back(crossing(u));
-        }
-        return left;
-    };
-    // Most triangles are far from all that is wanted when little is.
-    std::vector<char> columns;
-    std::vector<Triangle> near;
-    if (some) {
-        columns = grid.columns_of(*some);
-        std::vector<char> is_near(triangles.size());
-        for_each_block(triangles.size(), [&](std::size_t t) {
-            is_near[t] = grid.meets(box_around(triangles[t], cutoff), columns);
-        });
-        for (std::size_t t = 0; t < triangles.size(); ++t)
-            if (is_near[t]) near.push_back(triangles[t]);
-    }
-    const std::vector<Triangle>& searched = some ? near : triangles;
-    // Most crossings are near.
-    constexpr double kNear = 0.4;
-    const std::vector<int> left = search(searched, some ? &columns : nullptr, kNear * cutoff);
-    if (!left.empty()) {
-        columns = grid.columns_of(left);
-        search(searched, &columns, cutoff);
-    }
-    for (std::size_t u = 0; u < count; ++u)
-        distances[crossing(u)] = wanted[crossing(u)] ? std::numeric_limits<float>::infinity()
-                                                     : static_cast<float>(std::sqrt(least[u].get()));
+/// The distances that are at most `reach`; the others are infinite.
+std::vector<float> distances_within(double reach, const std::vector<Vec3>& points,
+                                    const std::vector<Triangle>& triangles, const CrossingGrid& grid) {
+    constexpr std::size_t kTriangles = 64, kCrossings = 16384;  // a thread's at least
+    std::vector<LeastSquare> least(grid.size());
+    const Vec3 around = Vec3::Constant(reach);
+    parallel_for_each(triangles.size(), kTriangles, [&](std::size_t t) {
+        const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]], &c = points[triangles[t][2]];
+        std::optional<FacingTriangle> triangle;  // where crossings are few, most are far from all
+        grid.for_each_in(Box(a.cwiseMin(b).cwiseMin(c) - around, a.cwiseMax(b).cwiseMax(c) + around),
+                         [&](std::size_t i) {
+                             if (!triangle) triangle.emplace(a, b, c);
+                             const double limit = std::min(reach * reach, least[i].get());
+                             least[i].take(triangle->squared_distance(grid[i], limit));
+                         });
+    });
+    std::vector<float> distances(grid.size());
+    parallel_for_each(grid.size(), kCrossings, [&](std::size_t i) {
+        const double square = least[i].get();
+        distances[i] = square > reach * reach ? std::numeric_limits<float>::infinity()
+                                              : static_cast<float>(std::sqrt(square));
+    });
+    return distances;
 }
 
 }  // namespace
 
 void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                        const CrossingGrid& grid, const std::vector<int>& some, double cutoff,
+                        const CrossingGrid& grid, std::vector<int> some, double cutoff,
                         std::vector<float>& distances) {
-    if (!some.empty()) measure_crossings(points, triangles, grid, &some, cutoff, distances);
+    if (some.empty()) return;
+    const CrossingGrid few = grid.some(some);
+    const std::vector<float> found = crossing_distances(points, triangles, few, cutoff);
+    for (std::size_t i = 0; i < some.size(); ++i) distances[some[i]] = found[i];
 }
 
 std::vector<float> crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                                       const CrossingGrid& grid, double cutoff) {
-    std::vector<float> distances(grid.size());
-    measure_crossings(points, triangles, grid, nullptr, cutoff, distances);
+    constexpr double kNear = 0.4;  // of the cutoff: most are
+    std::vector<float> distances = distances_within(kNear * cutoff, points, triangles, grid);
+    std::vector<int> left;
+    for (std::size_t i = 0; i < distances.size(); ++i)
+        if (std::isinf(distances[i])) left.push_back(static_cast<int>(i));
+    if (left.empty()) return distances;
+    const CrossingGrid far = grid.some(left);
+    const std::vector<float> found = distances_within(cutoff, points, triangles, far);
+    for (std::size_t i = 0; i < left.size(); ++i) distances[left[i]] = found[i];
     return distances;
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "parallel_for_each.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -41,14 +42,15 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     if (grid.empty()) return 0;
     const double spacing = grid.spacing();
     std::vector<std::atomic<char>> covered(grid.size());  // marked by several threads
-    // `else_reach`: where the surface is not flat.
-    const auto mark = [&](const Vec3& p, const Vec3& n, double reach, double else_reach,
-                          const std::vector<char>* columns = nullptr) {
+    // Of `some` of the crossings, which have these numbers. `else_reach`: where the surface is not flat.
+    const auto mark_some = [&](const CrossingGrid& some, const auto& number, const Vec3& p, const Vec3& n,
+                               double reach, double else_reach) {
         // A crossing lies within a cell's diagonal of its neighbours.
         reach = std::max(reach, 1.2 * spacing);
         else_reach = std::max(else_reach, 1.2 * spacing);
         const auto mark_one = [&](std::size_t c) {
-            const Surface::Crossing crossing = grid[c];
+            if (covered[number(c)].load(std::memory_order_relaxed)) return;
+            const Surface::Crossing crossing = some[c];
             const Vec3 way = crossing.point - p;
             const double near = crossing.flat ? reach : else_reach;
             if (way.squaredNorm() > near * near ||
@@ -57,24 +59,28 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
             const double facing = n.dot(crossing.outward.cast<double>());
             if (facing > kRounding ||
                 (facing > -kGrazing && way.squaredNorm() < kHere * spacing * kHere * spacing))
-                covered[c].store(1, std::memory_order_relaxed);
+                covered[number(c)].store(1, std::memory_order_relaxed);
         };
-        grid.for_each_in(Box(p - Vec3::Constant(reach), p + Vec3::Constant(reach)), mark_one, columns);
+        some.for_each_in(Box(p - Vec3::Constant(reach), p + Vec3::Constant(reach)), mark_one);
     };
-    const auto mark_all = [&](double share, const std::vector<char>* columns) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, particles.size(), 64), [&](const auto& range) {
-            for (std::size_t i = range.begin(); i < range.end(); ++i)
-                mark(particles.position[i], particles.normal[i], share * particles.spacing[i],
-                     share * particles.spacing[i], columns);
+    const auto own_number = [](std::size_t c) { return c; };
+    const auto mark = [&](const Vec3& p, const Vec3& n, double reach, double else_reach) {
+        mark_some(grid, own_number, p, n, reach, else_reach);
+    };
+    const auto mark_all = [&](double share, const CrossingGrid& some, const auto& number) {
+        constexpr std::size_t kParticles = 64;  // a thread's at least
+        parallel_for_each(particles.size(), kParticles, [&](std::size_t i) {
+            const double reach = share * particles.spacing[i];
+            mark_some(some, number, particles.position[i], particles.normal[i], reach, reach);
         });
     };
     if (particles.size() > 0) {
-        mark_all(kNear, nullptr);
+        mark_all(kNear, grid, own_number);
         std::vector<int> open;
         for (std::size_t c = 0; c < grid.size(); ++c)
             if (!covered[c]) open.push_back(static_cast<int>(c));
-        const std::vector<char> columns = grid.columns_of(open);
-        mark_all(kReach, &columns);
+        const CrossingGrid open_alone = grid.some(open);
+        mark_all(kReach, open_alone, [&](std::size_t c) { return static_cast<std::size_t>(open[c]); });
     }
 
     std::vector<std::pair<std::uint64_t, int>> order;

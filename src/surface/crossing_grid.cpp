@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <mutex>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -41,18 +42,20 @@ Box box_around(const std::vector<Surface::Crossing>& crossings) {
 CrossingGrid::CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
     : CrossingGrid{spacing, box_around(crossings), Surface::CrossingSequence(std::move(crossings))} {}
 
-CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequence crossings)
-    : spacing_(spacing), width_(2.0 * spacing) {
+CrossingGrid::CrossingGrid(double spacing, const Vec3& origin, const Vec3& size, std::size_t crossings)
+    : origin_(origin), size_(size), spacing_(spacing), width_(2.0 * spacing) {
     constexpr double kColumnsPerCrossing = 4.0;
-    if (crossings.size == 0) return;
-    origin_ = box.min();
-    const double most = kColumnsPerCrossing * static_cast<double>(crossings.size);
-    const Vec3 size = box.sizes();
+    if (crossings == 0) return;
+    const double most = kColumnsPerCrossing * static_cast<double>(crossings);
     width_ = std::max({width_, std::sqrt(size.x() * size.y() / most), size.x() / most, size.y() / most});
     for (int axis = 0; axis < 2; ++axis) count_[axis] = static_cast<int>(size[axis] / width_) + 1;
+    first_.assign(static_cast<std::size_t>(count_[0]) * count_[1] + 1, 0);
+}
 
-    const std::size_t columns = static_cast<std::size_t>(count_[0]) * count_[1];
-    first_.assign(columns + 1, 0);
+CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequence crossings)
+    : CrossingGrid(spacing, box.min(), box.sizes(), crossings.size) {
+    if (crossings.size == 0) return;
+    const std::size_t columns = first_.size() - 1;
     // Each goes to the next free place of its column, in any order: they are sorted then. To make them takes
     // longer than anything else here, so they are held twice; a frame needs its most memory later.
     std::vector<Entry> made(crossings.size);
@@ -106,9 +109,30 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     });
 }
 
-std::vector<char> CrossingGrid::columns_of(const std::vector<int>& some) const {
-    std::vector<char> result(first_.empty() ? 0 : first_.size() - 1, 0);
-    for (const int i : some) result[column_of(entries_[i].offset)] = 1;
+CrossingGrid CrossingGrid::some(std::vector<int>& numbers) const {
+    CrossingGrid result(spacing_, origin_, size_, numbers.size());
+    struct Place {
+        std::size_t column;
+        float z;
+        int number;
+    };
+    std::vector<Place> places;
+    places.reserve(numbers.size());
+    for (const int number : numbers) {
+        const Eigen::Vector3f& offset = entries_[number].offset;
+        places.push_back({result.column_of(offset), offset.z(), number});
+        ++result.first_[places.back().column + 1];
+    }
+    std::partial_sum(result.first_.begin(), result.first_.end(), result.first_.begin());
+    std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+        return std::tie(a.column, a.z, a.number) < std::tie(b.column, b.z, b.number);
+    });
+    result.entries_.reserve(places.size());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        numbers[i] = places[i].number;
+        result.entries_.push_back(entries_[places[i].number]);
+    }
+    result.directions_ = directions_;
     return result;
 }
 

@@ -150,10 +150,11 @@ std::vector<Surface::Crossing> BetweenCrossings::points_near(const Changes& chan
     std::vector<int> near;
     for (std::size_t c = 0; c < is_near.size(); ++c)
         if (is_near[c]) near.push_back(static_cast<int>(c));
-    const std::vector<char> columns = crossings_.columns_of(near);
-    std::vector<char> beside(triangles.size()), at(vertices.size(), 0);
+    const CrossingGrid near_alone = crossings_.some(near);
+    std::vector<char> beside(triangles.size(), 0), at(vertices.size(), 0);
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
-        beside[t] = crossings_.meets(box_along(triangles[t], vertices, tolerance_), columns);
+        near_alone.for_each_in(box_along(triangles[t], vertices, tolerance_),
+                               [&](std::size_t) { beside[t] = 1; });
     });
     std::vector<Triangle> some, around;
     for (std::size_t t = 0; t < triangles.size(); ++t) {

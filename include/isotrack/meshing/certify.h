@@ -94,7 +94,7 @@ std::vector<float> crossing_distances(const std::vector<Vec3>& points, const std
 
 /// The same for some crossings alone: their entries of `distances`; the others stay.
 void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                        const CrossingGrid& grid, const std::vector<int>& some, double cutoff,
+                        const CrossingGrid& grid, std::vector<int> some, double cutoff,
                         std::vector<float>& distances);
 
 }  // namespace isotrack

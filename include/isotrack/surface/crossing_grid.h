@@ -34,17 +34,19 @@ public:
     /// Whether some of a surface's crossings stand for all.
     bool thinned_out(const Surface& surface) const { return spacing_ >= 2.0 * surface.resolution(); }
 
-    /// Calls `visit` with the index of every crossing in `box`; of those in columns that are set only, if
-    /// given.
+    /// Some of them alone, found by place: the one with index i is that with index `numbers[i]` here. To that
+    /// end `numbers` are put into another order.
+    CrossingGrid some(std::vector<int>& numbers) const;
+
+    /// Calls `visit` with the index of every crossing in `box`.
     template <typename Visit>
-    void for_each_in(const Box& box, const Visit& visit, const std::vector<char>* columns = nullptr) const {
+    void for_each_in(const Box& box, const Visit& visit) const {
         if (empty()) return;
         const Vec3 low = box.min() - origin_, high = box.max() - origin_;
         const int to[2] = {column(0, high.x()), column(1, high.y())};
         for (int x = column(0, low.x()); x <= to[0]; ++x)
             for (int y = column(1, low.y()); y <= to[1]; ++y) {
                 const std::size_t at = static_cast<std::size_t>(x) * count_[1] + y;
-                if (columns && !(*columns)[at]) continue;
                 const auto end = entries_.begin() + static_cast<std::ptrdiff_t>(first_[at + 1]);
                 auto e =
                     std::lower_bound(entries_.begin() + static_cast<std::ptrdiff_t>(first_[at]), end, low.z(),
@@ -56,23 +58,11 @@ public:
             }
     }
 
-    /// Whether the box is over a column that is set.
-    bool meets(const Box& box, const std::vector<char>& columns) const {
-        if (empty()) return false;
-        const Vec3 low = box.min() - origin_, high = box.max() - origin_;
-        const int to[2] = {column(0, high.x()), column(1, high.y())};
-        for (int x = column(0, low.x()); x <= to[0]; ++x)
-            for (int y = column(1, low.y()); y <= to[1]; ++y)
-                if (columns[static_cast<std::size_t>(x) * count_[1] + y]) return true;
-        return false;
-    }
-
-    /// Flags per column: it holds one of these crossings.
-    std::vector<char> columns_of(const std::vector<int>& some) const;
-
 private:
     /// `box`: around them.
     CrossingGrid(double spacing, const Box& box, Surface::CrossingSequence crossings);
+    /// Without crossings, for so many.
+    CrossingGrid(double spacing, const Vec3& origin, const Vec3& size, std::size_t crossings);
 
     /// A crossing in 16 bytes: there are more of them than of all else.
     struct Entry {
@@ -90,7 +80,7 @@ private:
     std::vector<Entry> entries_;
     std::vector<Eigen::Vector3f> directions_;  // those of a lattice: few
     std::vector<std::size_t> first_;           // of each column, and the end
-    Vec3 origin_ = Vec3::Zero();
+    Vec3 origin_, size_;                       // of the box around them
     double spacing_, width_;  // of the columns: wider where there would be many more than crossings
     int count_[2] = {1, 1};
 };
