@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "find_in_blocks.h"
 #include "isotrack/meshing/certify.h"
@@ -34,14 +35,14 @@ std::optional<std::vector<int>> MeshDistances::measure(const std::vector<Vec3>& 
                                                        const std::vector<Triangle>& triangles,
                                                        const FacetChanges& changes) {
     if (distances_.empty() || changes.many) {
+        reach_ = cutoff_;
         distances_ = crossing_distances(vertices, triangles, points_, cutoff_);
         return std::nullopt;
     }
     // What was nearest to a triangle that went is to be measured again; what is nearer to one that came than
     // to all before is measured now.
     const double same = 1e-6 * cutoff_;  // ample for the rounding to floats
-    const Survey before = survey(cutoff_);
-    const double reach = before.lost > 0 ? cutoff_ : before.farthest;
+    const double reach = std::exchange(reach_, cutoff_);
     constexpr float kUnknown = -1.0f;
     constexpr std::size_t kFacetsPerBlock = 16;
     struct Near {
@@ -83,7 +84,7 @@ std::optional<std::vector<int>> MeshDistances::measure(const std::vector<Vec3>& 
     return changed;
 }
 
-MeshDistances::Survey MeshDistances::survey(double limit) const {
+MeshDistances::Survey MeshDistances::survey(double limit) {
     constexpr std::size_t kBlock = 32768;
     std::vector<Survey> blocks((distances_.size() + kBlock - 1) / kBlock);
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
@@ -109,6 +110,7 @@ MeshDistances::Survey MeshDistances::survey(double limit) const {
         result.sum_of_squares += block.sum_of_squares;
         result.weight += block.weight;
     }
+    if (result.lost == 0) reach_ = result.farthest;
     return result;
 }
 

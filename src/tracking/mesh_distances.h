@@ -28,7 +28,8 @@ std::vector<Triangle> triangles_near_gone(const std::vector<Facet>& went, double
 class MeshDistances {
 public:
     /// Distances as those of `crossing_distances`, with its `cutoff`. `points` must outlive it.
-    MeshDistances(const CrossingGrid& points, double cutoff) : points_(points), cutoff_(cutoff) {}
+    MeshDistances(const CrossingGrid& points, double cutoff)
+        : points_(points), cutoff_(cutoff), reach_(cutoff) {}
 
     void forget() { distances_ = std::vector<float>(); }  // there are many
     /// `changes`: since the mesh measured last, if there is one, with the triangles within two cutoffs
@@ -44,7 +45,7 @@ public:
         double sum_of_squares = 0.0,
                weight = 0.0;  ///< Of these, each counted as many times as it stands for.
     };
-    Survey survey(double limit) const;
+    Survey survey(double limit);
 
     const CrossingGrid& points() const { return points_; }
     double operator[](std::size_t point) const { return distances_[point]; }
@@ -53,6 +54,7 @@ private:
     const CrossingGrid& points_;
     const double cutoff_;
     std::vector<float> distances_;  // empty: not measured yet
+    double reach_;                  // none that is found is larger, as far as it was looked at
 };
 
 }  // namespace isotrack
