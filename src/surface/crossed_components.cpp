@@ -1,76 +1,128 @@
 #include "surface/crossed_components.h"
 
+#include <openvdb/tree/LeafManager.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <atomic>
+#include <bitset>
 #include <cstdint>
+#include <functional>
+#include <unordered_map>
 #include <vector>
 
 #include "surface/ambiguous_faces.h"
-#include "surface/node_values.h"
+#include "surface/leaf_sides.h"
 
 namespace isotrack {
 namespace {
 
 using openvdb::Coord;
+using Leaf = openvdb::FloatTree::LeafNodeType;
+using Bits = std::uint64_t;
 
-/// The numbers of crossed edges by their lower end and axis.
-class EdgeNumbers {
+constexpr int kDim = LeafSides::kDim;
+constexpr std::size_t kBlocks = 128;  // a thread's at least
+
+int count_of(Bits bits) {
+    return static_cast<int>(std::bitset<64>(bits).count());
+}
+
+/// Which nodes of layer x of a block are inside, one step further along some axes.
+Bits inside_at(const LeafSides& sides, int x, const Coord& step) {
+    return sides.word(x + step.x(), step.y(), step.z());
+}
+
+Coord unit(int axis) {
+    Coord result(0);
+    result[axis] = 1;
+    return result;
+}
+
+/// As many nodes as a leaf has, where there is one or a part of a tile; and the crossed edges with their
+/// lower ends there.
+class Block {
 public:
-    explicit EdgeNumbers(const UnsetVector<CrossedEdge>& edges) : edges_(edges), places_(size_for(edges)) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, edges.size(), 4096), [&](const auto& range) {
-            for (std::size_t e = range.begin(); e < range.end(); ++e) {
-                std::size_t at = place_of(edges[e].from, edges[e].axis);
-                for (std::uint32_t none = 0; !places_[at].compare_exchange_strong(
-                         none, static_cast<std::uint32_t>(e + 1), std::memory_order_relaxed);
-                     none = 0)
-                    at = (at + 1) & (places_.size() - 1);
+    Block(const Coord& origin, const LeafSides& sides) : origin_(origin) {
+        for (int axis = 0; axis < 3; ++axis)
+            for (int x = 0; x < kDim; ++x) {
+                crossed_[axis][x] = inside_at(sides, x, Coord(0)) ^ inside_at(sides, x, unit(axis));
+                first_[axis][x] = count_;
+                count_ += count_of(crossed_[axis][x]);
             }
-        });
     }
-
-    /// -1 where there is none, as between two tiles.
-    int at(const Coord& from, int axis) const {
-        for (std::size_t at = place_of(from, axis);; at = (at + 1) & (places_.size() - 1)) {
-            const std::uint32_t number = places_[at].load(std::memory_order_relaxed);
-            if (number == 0) return -1;
-            const CrossedEdge& edge = edges_[number - 1];
-            if (edge.axis == axis && edge.from == from) return static_cast<int>(number - 1);
-        }
+    const Coord& origin() const { return origin_; }
+    /// From now on they are numbered from `first` on; returns where the next block's begin.
+    int number_from(int first) {
+        for (auto& of_axis : first_)
+            for (int& of_layer : of_axis) of_layer += first;
+        return first + count_;
+    }
+    /// The number of the crossed edge along an axis from the node at bit 8 y + z of layer x.
+    int number(int axis, int x, int bit) const {
+        return first_[axis][x] + count_of(crossed_[axis][x] & ((Bits{1} << bit) - 1));
     }
 
 private:
-    static std::size_t size_for(const UnsetVector<CrossedEdge>& edges) {
-        std::size_t size = 64;
-        while (size < 2 * edges.size()) size *= 2;
-        return size;
-    }
-    std::size_t place_of(const Coord& from, int axis) const {
-        const auto part = [](int i, std::uint64_t factor) { return static_cast<std::uint32_t>(i) * factor; };
-        const std::uint64_t mixed = part(from.x(), 0x9e3779b97f4a7c15) ^ part(from.y(), 0xc2b2ae3d27d4eb4f) ^
-                                    part(from.z(), 0x165667b19e3779f9) ^ part(axis, 0x27d4eb2f165667c5);
-        return static_cast<std::size_t>(mixed >> 20) & (places_.size() - 1);
-    }
-
-    const UnsetVector<CrossedEdge>& edges_;
-    std::vector<std::atomic<std::uint32_t>> places_;  // one more than the number; 0: free
+    Coord origin_;
+    Bits crossed_[3][kDim];
+    int first_[3][kDim], count_ = 0;
 };
 
-/// A face of the lattice by its lowest node and its two axes, `first` below `second`.
-struct Face {
-    Coord low;
-    int first, second;
-
-    Coord node(int u, int w, int out = 0) const {
-        Coord result = low;
-        result[first] += u;
-        result[second] += w;
-        result[3 - first - second] += out;
-        return result;
+/// The parts of tiles, by their origins, that nodes in the lowest layers of a leaf are on the other side of.
+template <typename Visit>
+void for_each_tile_below(const Leaf& leaf, const LeafSides& sides, TreeReader& reader, const Visit& visit) {
+    constexpr Bits kRow = 0xff, kColumn = 0x0101010101010101;
+    for (int lower = 1; lower < 8; ++lower) {
+        const Coord below(lower >> 2, lower >> 1 & 1, lower & 1);
+        const Coord origin = leaf.origin().offsetBy(-kDim * below.x(), -kDim * below.y(), -kDim * below.z());
+        if (reader.probeConstLeaf(origin)) continue;
+        const Bits beside = (below.y() ? kRow : ~Bits{0}) & (below.z() ? kColumn : ~Bits{0}),
+                   tile = reader.getValue(origin) < 0.0f ? ~Bits{0} : 0;
+        for (int x = 0; x < (below.x() ? 1 : kDim); ++x)
+            if (((sides.word(x, 0, 0) ^ tile) & beside) != 0) {
+                visit(origin);
+                break;
+            }
     }
-};
+}
+
+/// All that have nodes on both sides, or next to such.
+std::vector<Block> mixed_blocks(const openvdb::FloatTree& tree) {
+    const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(tree);
+    struct Found {
+        std::vector<Block> blocks;
+        std::vector<Coord> tiles;
+    };
+    tbb::enumerable_thread_specific<Found> found_by_threads;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.leafCount(), kBlocks),
+                      [&](const auto& range) {
+                          Found& found = found_by_threads.local();
+                          TreeReader reader(tree);
+                          LeafSigns signs;
+                          for (std::size_t n = range.begin(); n < range.end(); ++n) {
+                              const Leaf& leaf = leaves.leaf(n);
+                              const LeafSides sides(leaf, reader, signs);
+                              if (sides.are_mixed()) found.blocks.emplace_back(leaf.origin(), sides);
+                              for_each_tile_below(leaf, sides, reader,
+                                                  [&](const Coord& tile) { found.tiles.push_back(tile); });
+                          }
+                      });
+    std::vector<Block> result;
+    std::vector<Coord> tiles;
+    for (const Found& found : found_by_threads) {
+        result.insert(result.end(), found.blocks.begin(), found.blocks.end());
+        tiles.insert(tiles.end(), found.tiles.begin(), found.tiles.end());
+    }
+    std::sort(tiles.begin(), tiles.end());
+    tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
+    TreeReader reader(tree);
+    LeafSigns signs;
+    for (const Coord& tile : tiles) result.emplace_back(tile, LeafSides(tile, nullptr, reader, signs));
+    return result;
+}
 
 /// Which edges hang together, found by several threads at once.
 class SharedSets {
@@ -105,91 +157,122 @@ private:
     std::vector<std::atomic<int>> parent_;
 };
 
-/// Joins the crossed edges of faces, each face once: from the edge that comes first in it.
+/// Joins the crossed edges of the faces that have their lowest node in a block.
 class FaceJoiner {
 public:
-    FaceJoiner(const EdgeNumbers& numbers, const openvdb::FloatTree& tree, SharedSets& sets)
-        : numbers_(numbers), nodes_(tree), sets_(sets) {}
+    /// `above`: the next blocks along each axis, null where no crossed edge has its lower end.
+    FaceJoiner(const Block& block, const Block* const (&above)[3], const LeafSides& sides, TreeReader& reader,
+               SharedSets& sets)
+        : block_(block), above_(above), sides_(sides), reader_(reader), sets_(sets) {}
 
-    void join_around(int number, const CrossedEdge& edge) {
-        around_ = edge.from.offsetBy(-1);
-        nodes_.block(around_, values_);
-        for (int other = 0; other < 3; ++other) {
-            if (other == edge.axis) continue;
-            if (other < edge.axis) {
-                join_along_second(number, edge.outward, {edge.from, other, edge.axis});
-                continue;
-            }
-            Coord below = edge.from;
-            --below[other];
-            join_along_first(number, edge.outward, {edge.from, edge.axis, other});
-            join_from_far_side(number, edge.outward, {below, edge.axis, other});
-        }
+    /// Returns how many sets became one with another.
+    std::size_t join_all() {
+        for (int first = 0; first < 3; ++first)
+            for (int second = first + 1; second < 3; ++second)
+                for (int x = 0; x < kDim; ++x) join_across(x, first, second);
+        return joined_;
     }
-    /// So many sets became one with another.
-    std::size_t joined() const { return joined_; }
 
 private:
-    bool inside(const Coord& node) const {
-        const Coord at = node - around_;
-        return values_[at.x()][at.y()][at.z()] < 0.0f;
-    }
-    int along_first(const Face& f, int w) const { return numbers_.at(f.node(0, w), f.first); }
-    int along_second(const Face& f, int u) const { return numbers_.at(f.node(u, 0), f.second); }
-    void join(int e, int other) {
-        if (other >= 0 && e >= 0) joined_ += sets_.join(e, other);
-    }
-
-    /// From the edge along the first axis at the lowest node, which is inside or not.
-    void join_along_first(int e, bool low, const Face& f) {
-        const bool w = inside(f.node(0, 1)), high = inside(f.node(1, 1));
-        if (w == high) {
-            join(e, along_second(f, low == w ? 1 : 0));
-        } else if (low == w) {
-            join(e, along_first(f, 1));
-        } else {
+    /// In faces along two axes from layer x.
+    void join_across(int x, int first, int second) {
+        const Coord u = unit(first), w = unit(second);
+        const Bits low = inside_at(sides_, x, Coord(0)), at_u = inside_at(sides_, x, u),
+                   at_w = inside_at(sides_, x, w), at_both = inside_at(sides_, x, u + w);
+        // The face's edges along the first axis and along the second, from the lowest node and from the next.
+        const Bits along_first[2] = {low ^ at_u, at_w ^ at_both},
+                   along_second[2] = {low ^ at_w, at_u ^ at_both};
+        if ((along_first[0] | along_first[1] | along_second[0] | along_second[1]) == 0) return;
+        const auto first_edge = [&](int side, int bit) { return edge(first, second, side, x, bit); };
+        const auto second_edge = [&](int side, int bit) { return edge(second, first, side, x, bit); };
+        const Bits ambiguous = along_first[0] & along_first[1] & along_second[0];  // the fourth, too
+        for_each_bit(along_first[0] & along_first[1] & ~ambiguous,
+                     [&](int bit) { join(first_edge(0, bit), first_edge(1, bit)); });
+        for_each_bit(along_second[0] & along_second[1] & ~ambiguous,
+                     [&](int bit) { join(second_edge(0, bit), second_edge(1, bit)); });
+        for (const int f : {0, 1})
+            for (const int s : {0, 1})
+                for_each_bit(along_first[f] & along_second[s] & ~ambiguous,
+                             [&](int bit) { join(first_edge(f, bit), second_edge(s, bit)); });
+        for_each_bit(ambiguous, [&](int bit) {
             // Either the inside nodes are cut off from each other, or the outside ones are.
-            const bool joined = joins_diagonal([&](int side, int a, int b) {
-                return inside(f.node(low ? a : 1 - a, b, side == 0 ? -1 : 1));
-            });
-            const bool low_is_cut_off = low != joined;
-            join(e, along_second(f, low_is_cut_off ? 0 : 1));
-            join(along_first(f, 1), along_second(f, low_is_cut_off ? 1 : 0));
-        }
-    }
-    /// From the one along the first axis on the other side, where the former is not crossed.
-    void join_from_far_side(int e, bool w, const Face& f) {
-        const bool low = inside(f.low);
-        if (low == inside(f.node(1, 0))) join(e, along_second(f, low == w ? 1 : 0));
-    }
-    /// From the one along the second axis at the lowest node, where none of these are.
-    void join_along_second(int e, bool low, const Face& f) {
-        if (inside(f.node(1, 0)) == low && inside(f.node(1, 1)) != low) join(e, along_second(f, 1));
+            const Coord node = block_.origin().offsetBy(x, bit / kDim, bit % kDim),
+                        out = unit(3 - first - second);
+            const bool is_low_inside = (low >> bit & 1u) != 0;
+            const auto inside = [&](int side, int a, int b) {
+                Coord at = side == 0 ? node - out : node + out;
+                if (is_low_inside ? a : 1 - a) at += u;
+                if (b) at += w;
+                return reader_.getValue(at) < 0.0f;
+            };
+            const int cut_off =
+                is_low_inside != joins_diagonal(inside) ? 0 : 1;  // the lowest node, or those next
+            join(first_edge(0, bit), second_edge(cut_off, bit));
+            join(first_edge(1, bit), second_edge(1 - cut_off, bit));
+        });
     }
 
-    const EdgeNumbers& numbers_;
-    NodeValues nodes_;
-    Coord around_;           // the lowest of the nodes around the edge
-    float values_[4][4][4];  // at them
+    /// Calls `visit(bit)` for each that is set.
+    template <typename Visit>
+    static void for_each_bit(Bits bits, const Visit& visit) {
+        for (; bits != 0; bits &= bits - 1) visit(__builtin_ctzll(bits));
+    }
+
+    /// The number of an edge of the face from a node: along `axis`, on one of its sides across it.
+    int edge(int axis, int across, int side, int x, int bit) const {
+        int at[3] = {x, bit / kDim, bit % kDim};
+        const Block* block = &block_;
+        if (side == 1 && ++at[across] == kDim) {
+            at[across] = 0;
+            block = above_[across];
+        }
+        return block ? block->number(axis, at[0], kDim * at[1] + at[2]) : -1;
+    }
+    void join(int e, int other) {
+        if (e >= 0 && other >= 0) joined_ += sets_.join(e, other);
+    }
+
+    const Block& block_;
+    const Block* const (&above_)[3];
+    const LeafSides& sides_;
+    TreeReader& reader_;
     SharedSets& sets_;
     std::size_t joined_ = 0;
 };
 
 }  // namespace
 
-std::size_t count_components(const CrossedEdges& crossed, const openvdb::FloatTree& tree) {
-    const UnsetVector<CrossedEdge>& edges = crossed.edges;
-    const EdgeNumbers numbers(edges);
-    SharedSets sets(edges.size());
-    return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, edges.size(), 8192), edges.size(),
+std::size_t count_components(const openvdb::FloatTree& tree) {
+    std::vector<Block> blocks = mixed_blocks(tree);
+    std::unordered_map<Coord, const Block*, std::hash<Coord>> at;
+    at.reserve(blocks.size());
+    int edges = 0;
+    for (Block& block : blocks) {
+        edges = block.number_from(edges);
+        at.emplace(block.origin(), &block);
+    }
+    SharedSets sets(static_cast<std::size_t>(edges));
+    const std::size_t joined = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, blocks.size(), kBlocks), std::size_t{0},
         [&](const auto& range, std::size_t count) {
-            FaceJoiner joiner(numbers, tree, sets);
-            for (std::size_t e = range.begin(); e < range.end(); ++e)
-                joiner.join_around(static_cast<int>(e), edges[e]);
-            return count - joiner.joined();
+            TreeReader reader(tree);
+            LeafSigns signs;
+            for (std::size_t b = range.begin(); b < range.end(); ++b) {
+                const Coord& origin = blocks[b].origin();
+                const Block* above[3];
+                for (int axis = 0; axis < 3; ++axis) {
+                    Coord beyond = origin;
+                    beyond[axis] += kDim;
+                    const auto next = at.find(beyond);
+                    above[axis] = next == at.end() ? nullptr : next->second;
+                }
+                const LeafSides sides(origin, reader.probeConstLeaf(origin), reader, signs);
+                count += FaceJoiner(blocks[b], above, sides, reader, sets).join_all();
+            }
+            return count;
         },
-        [&](std::size_t a, std::size_t b) { return a + b - edges.size(); });
+        std::plus<std::size_t>());
+    return static_cast<std::size_t>(edges) - joined;
 }
 
 }  // namespace isotrack

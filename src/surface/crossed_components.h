@@ -5,12 +5,10 @@
 
 #include <cstddef>
 
-#include "surface/crossed_edges.h"
-
 namespace isotrack {
 
-/// How many there are: edges hang together across faces of the lattice, ambiguous ones joined as volumeToMesh
-/// joins them. `crossed`: those of `tree`. Uses TBB inside.
-std::size_t count_components(const CrossedEdges& crossed, const openvdb::FloatTree& tree);
+/// How many there are: edges of which one end is inside hang together across faces of the lattice, ambiguous
+/// ones joined as volumeToMesh joins them. Edges between two tiles are not seen. Uses TBB inside.
+std::size_t count_components(const openvdb::FloatTree& tree);
 
 }  // namespace isotrack

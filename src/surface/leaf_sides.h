@@ -84,14 +84,17 @@ public:
     using Leaf = LeafSigns::Leaf;
     static constexpr int kDim = LeafSigns::kDim;
 
-    LeafSides(const Leaf& leaf, TreeReader& reader, LeafSigns& signs) {
+    LeafSides(const Leaf& leaf, TreeReader& reader, LeafSigns& signs)
+        : LeafSides(leaf.origin(), &leaf, reader, signs) {}
+    /// `leaf`: the one at `origin`, null where a tile is.
+    LeafSides(const openvdb::Coord& origin, const Leaf* leaf, TreeReader& reader, LeafSigns& signs) {
         for (const int i : {0, 1}) {
             // Of this leaf or the one beyond it along the first axis, and of those further along the others.
             LeafSigns::Layers layers[2][2];
             for (const int j : {0, 1})
                 for (const int k : {0, 1}) {
-                    const openvdb::Coord at = leaf.origin().offsetBy(kDim * i, kDim * j, kDim * k);
-                    const Leaf* home = i + j + k == 0 ? &leaf : reader.probeConstLeaf(at);
+                    const openvdb::Coord at = origin.offsetBy(kDim * i, kDim * j, kDim * k);
+                    const Leaf* home = i + j + k == 0 ? leaf : reader.probeConstLeaf(at);
                     if (home)
                         layers[j][k] = signs.of(*home);
                     else

@@ -368,7 +368,7 @@ std::optional<long> LevelSet::lattice_euler() const {
     return impl_->crossed.cell_parts - static_cast<long>(impl_->crossed.edges.size());
 }
 std::optional<std::size_t> LevelSet::lattice_component_count() const {
-    return count_components(impl_->crossed, impl_->grid->constTree());
+    return count_components(impl_->grid->constTree());
 }
 namespace {
 

@@ -119,6 +119,28 @@ TEST(LatticeMesh, HasTheEulerNumberThatItsCellsSay) {
     }
 }
 
+TEST(LatticeMesh, HasTheComponentsThatHangTogetherAlongTheBorderOfItsLeaves) {
+    // A full block with pits in one of its sides: their walls meet the rest at that side alone, beyond which
+    // there is a tile.
+    for (int side = 0; side < 6; ++side) {
+        auto grid = openvdb::FloatGrid::create(1.0f);
+        grid->setGridClass(openvdb::GRID_LEVEL_SET);
+        auto values = grid->getAccessor();
+        for (auto node = openvdb::CoordBBox(openvdb::Coord(0), openvdb::Coord(15)).begin(); node; ++node) {
+            const int axis = side / 2, depth = side % 2 == 0 ? (*node)[axis] : 15 - (*node)[axis],
+                      u = (*node)[(axis + 1) % 3], w = (*node)[(axis + 2) % 3];
+            const auto is_within = [](int i, int low) { return i >= low && i < low + 3; };
+            const bool in_pit = depth < 4 && is_within(w, 6) && (is_within(u, 2) || is_within(u, 9));
+            values.setValue(*node, in_pit ? 0.5f : -0.5f);
+        }
+        const LevelSet block(grid);
+        const MeshTopology theirs = mesh_topology(volume_to_mesh(block));
+        EXPECT_EQ(theirs.components, 1u);
+        EXPECT_EQ(block.lattice_component_count(), theirs.components) << side;
+        EXPECT_EQ(block.lattice_euler(), theirs.euler) << side;
+    }
+}
+
 TEST(LatticeMesh, OfABallIsOnIt) {
     const Vec3 centre(0.3, -0.2, 0.1);
     const LevelSet ball = cube_of([&](int x, int y, int z) { return (Vec3(x, y, z) - centre).norm() - 7.3; });
