@@ -109,7 +109,8 @@ float rounded_up(double x) {
 // boxes along its axis 2, then 1, and scans along axis 0: with the thin side of the slabs on axis 1 a search
 // costs 0.5 us per triangle, on axis 2 up to 2.
 constexpr int kSlabAxis = 1;
-constexpr std::size_t kSlabSize = 4096;     // boxes that begin in a slab, on average
+constexpr std::size_t kSlabSize = 4096;               // boxes that begin in a slab, at most on average
+constexpr std::size_t kFewest = 4, kLeastSlab = 512;  // slabs, unless they would have fewer boxes
 constexpr std::ptrdiff_t kScanBelow = 100;  // boxes; splitting further costs more than comparing all
 
 /// Boxes of the triangles with area, in the mesh's order.
@@ -153,14 +154,14 @@ struct Slab {
 };
 
 std::vector<Slab> cut_into_slabs(const std::vector<TriangleBox>& boxes) {
-    constexpr std::size_t kSamplesPerSlab = 64;
+    constexpr std::size_t kEvery = 64;  // box of which one is a sample
     std::vector<float> sample;
-    for (std::size_t i = 0; i < boxes.size(); i += kSlabSize / kSamplesPerSlab)
-        sample.push_back(boxes[i].low[kSlabAxis]);
+    for (std::size_t i = 0; i < boxes.size(); i += kEvery) sample.push_back(boxes[i].low[kSlabAxis]);
     std::sort(sample.begin(), sample.end());
+    const std::size_t wanted =
+        std::max(boxes.size() / kSlabSize + 1, std::min(boxes.size() / kLeastSlab, kFewest));
     std::vector<float> begins;  // of all slabs but the first
-    for (std::size_t i = kSamplesPerSlab; i < sample.size(); i += kSamplesPerSlab)
-        begins.push_back(sample[i]);
+    for (std::size_t k = 1; k < wanted; ++k) begins.push_back(sample[k * sample.size() / wanted]);
 
     const auto slab_of = [&](const TriangleBox& box) -> std::size_t {
         return std::upper_bound(begins.begin(), begins.end(), box.low[kSlabAxis]) - begins.begin();
