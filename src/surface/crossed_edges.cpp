@@ -45,14 +45,43 @@ struct LayerEdges {
     static constexpr Bits kNotLastY = 0x00ffffffffffffff, kNotLastZ = 0x7f7f7f7f7f7f7f7f;
 };
 
-/// Calls `visit(x, here, edges)` for each layer of a leaf.
+/// The faces with all four edges crossed that have their lowest node in a leaf.
+class Saddles {
+public:
+    explicit Saddles(const LeafSides& sides) {
+        for (int x = 0; x < kDim; ++x) {
+            const Bits here = sides.word(x, 0, 0), at_x = sides.word(x + 1, 0, 0), at_y = sides.word(x, 1, 0),
+                       at_z = sides.word(x, 0, 1);
+            // Three of the edges are; then so is the fourth.
+            const auto face = [&](Bits one, Bits other, Bits both) {
+                return (here ^ one) & (here ^ other) & (one ^ both);
+            };
+            across_z_[x] = face(at_x, at_y, sides.word(x + 1, 1, 0));
+            across_y_[x] = face(at_x, at_z, sides.word(x + 1, 0, 1));
+            across_x_[x] = face(at_y, at_z, sides.word(x, 1, 1));
+        }
+    }
+    /// `CrossedEdge::saddles` of the edge along an axis from the node with this offset in the leaf.
+    int of(int axis, int offset) const {
+        const auto is_in = [&](const Bits(&faces)[kDim], int other) {
+            return static_cast<int>(faces[offset / (kDim * kDim)] >> offset % (kDim * kDim) & 1) << other;
+        };
+        if (axis == 0) return is_in(across_z_, 1) | is_in(across_y_, 2);
+        return axis == 1 ? is_in(across_x_, 2) : 0;
+    }
+
+private:
+    Bits across_x_[kDim], across_y_[kDim], across_z_[kDim];
+};
+
+/// Calls `visit(x, edges)` for each layer of a leaf.
 template <typename Visit>
 void for_each_layer(const LeafSides& sides, const Visit& visit) {
     Bits next = sides.layer(0, 0);
     for (int x = 0; x < kDim; ++x) {
         const Bits here = next;
         if (x + 1 < kDim) next = sides.layer(0, x + 1);
-        visit(x, here, LayerEdges(here, next));
+        visit(x, LayerEdges(here, next));
     }
 }
 
@@ -88,7 +117,7 @@ std::size_t count_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader&
         if (edges != 0) result += std::bitset<64>(edges).count();
     };
     if (sides.are_mixed())
-        for_each_layer(sides, [&](int, Bits, const LayerEdges& edges) {
+        for_each_layer(sides, [&](int, const LayerEdges& edges) {
             for (const Bits along : edges.along) add(along);
         });
     for_each_face(leaf, sides, reader, [&](const FaceEdges& face) { add(face.edges); });
@@ -98,34 +127,24 @@ std::size_t count_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader&
 /// Writes them from `next` on, and returns how many of them are at the border.
 std::size_t write_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader& reader, CrossedEdge* next) {
     const float* own = leaf.buffer().data();
+    const Saddles saddles(sides);
     constexpr int kNotLookedAt = 7;
     std::size_t at_border = 0;
-    const auto add = [&](const Coord& from, int axis, float a, float b, bool active, int saddles) {
+    const auto add = [&](const Coord& from, int axis, float a, float b, bool active, int own_saddles) {
         const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
         *next++ = {from,     fraction, static_cast<std::int8_t>(axis),
-                   a < 0.0f, !active,  static_cast<std::uint8_t>(saddles)};
+                   a < 0.0f, !active,  static_cast<std::uint8_t>(own_saddles)};
         at_border += !active;
     };
     const auto is_on = [](const Leaf& of, int offset) {
         return of.isValueOn(static_cast<openvdb::Index>(offset));
     };
-    for_each_layer(sides, [&](int x, Bits here, const LayerEdges& edges) {
-        // Of the faces that an edge spans with one along a further axis; those that leave the leaf may be
-        // any.
-        const auto saddles = [](Bits some, Bits opposite, Bits beside, Bits within) {
-            return ~within | (some & opposite & beside);
-        };
-        constexpr Bits kNotLastY = LayerEdges::kNotLastY, kNotLastZ = LayerEdges::kNotLastZ;
-        const Bits along_x = edges.along[0], by_y = here ^ here >> kDim, by_z = here ^ here >> 1;
-        const Bits along_y[3] = {saddles(along_x, along_x >> kDim, by_y, kNotLastY), 0, 0};
-        const Bits along_z[3] = {saddles(along_x, along_x >> 1, by_z, kNotLastZ),
-                                 saddles(by_y, by_y >> 1, by_z, kNotLastY & kNotLastZ), 0};
+    for_each_layer(sides, [&](int x, const LayerEdges& edges) {
         for (int axis = 0; axis < 3; ++axis)
             for_each_bit(edges.along[axis], [&](int bit) {
                 const int offset = kDim * kDim * x + bit, beyond = offset + kStride[axis];
                 add(leaf.offsetToGlobalCoord(offset), axis, own[offset], own[beyond],
-                    is_on(leaf, offset) && is_on(leaf, beyond),
-                    static_cast<int>((along_y[axis] >> bit & 1) << 1 | (along_z[axis] >> bit & 1) << 2));
+                    is_on(leaf, offset) && is_on(leaf, beyond), saddles.of(axis, offset));
             });
     });
     for_each_face(leaf, sides, reader, [&](const FaceEdges& face) {
@@ -139,7 +158,8 @@ std::size_t write_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader&
             Coord from = leaf.offsetToGlobalCoord(offset);
             if (!face.up) from[face.axis] -= 1;
             add(from, face.axis, face.up ? inner : outer, face.up ? outer : inner,
-                is_on(leaf, offset) && (face.beyond ? is_on(*face.beyond, there) : is_tile_on), kNotLookedAt);
+                is_on(leaf, offset) && (face.beyond ? is_on(*face.beyond, there) : is_tile_on),
+                face.up ? saddles.of(face.axis, offset) : kNotLookedAt);
         });
     });
     return at_border;

@@ -20,7 +20,7 @@ struct CrossedEdge {
     bool outward;    ///< `from` is the end inside.
     bool at_border;  ///< One end is an inactive voxel.
     /// A bit for each axis above its own: the face that it spans with one step along that axis may have its
-    /// two inside nodes across a diagonal. Of faces within a leaf it is known, of others not looked at.
+    /// two inside nodes across a diagonal. Where `from` is in a leaf it is known to, else not looked at.
     std::uint8_t saddles;
 
     Vec3 index() const {
