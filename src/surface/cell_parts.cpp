@@ -114,18 +114,7 @@ long parts_in(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
 /// Of the cells that have their least node in a tile, and in this leaf the first on the other side.
 long parts_below(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
     long result = 0;
-    for (int lower = 1; lower < 8; ++lower) {
-        const int below[] = {lower >> 2, lower >> 1 & 1, lower & 1};
-        const Coord home = leaf.origin().offsetBy(-kDim * below[0], -kDim * below[1], -kDim * below[2]);
-        if (reader.probeConstLeaf(home)) continue;
-        // Nearly always all nodes of the leaf there are on the tile's side.
-        const bool tile = reader.getValue(home) < 0.0f;
-        const unsigned bits = below[2] ? 1u : 0x1ffu;
-        bool all_same = true;
-        for (int x = 0; x <= (below[0] ? 0 : kDim); ++x)
-            for (int y = 0; y <= (below[1] ? 0 : kDim); ++y)
-                all_same = all_same && (sides.row(x, y) & bits) == (tile ? bits : 0u);
-        if (all_same) continue;
+    for_each_tile_below(leaf, sides, reader, [&](const Coord& below, bool tile_inside) {
         const auto end = [&](int axis) { return below[axis] ? 0 : kDim; };
         const auto begin = [&](int axis) { return -below[axis]; };
         for (int x = begin(0); x < end(0); ++x)
@@ -136,11 +125,11 @@ long parts_below(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
                     unsigned mask = 0;
                     for (int n = 0; n < 8; ++n)
                         mask |= static_cast<unsigned>(reader.getValue(node(n)) < 0.0f) << n;
-                    const unsigned others = tile ? mask ^ 0xffu : mask;
+                    const unsigned others = tile_inside ? mask ^ 0xffu : mask;
                     if (others != 0 && reader.probeConstLeaf(node(__builtin_ctz(others))) == &leaf)
                         result += parts_at(cell, mask, reader);
                 }
-    }
+    });
     return result;
 }
 

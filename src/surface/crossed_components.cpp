@@ -24,6 +24,7 @@ using Leaf = openvdb::FloatTree::LeafNodeType;
 using Bits = std::uint64_t;
 
 constexpr int kDim = LeafSides::kDim;
+constexpr std::size_t kLog2Dim = Leaf::LOG2DIM;
 constexpr std::size_t kBlocks = 128;  // a thread's at least
 
 int count_of(Bits bits) {
@@ -45,13 +46,20 @@ Coord unit(int axis) {
 /// lower ends there.
 class Block {
 public:
-    Block(const Coord& origin, const LeafSides& sides) : origin_(origin) {
-        for (int axis = 0; axis < 3; ++axis)
+    /// Of a tile those edges alone whose upper ends are in a leaf.
+    Block(const Coord& origin, const LeafSides& sides, TreeReader& reader) : origin_(origin) {
+        const bool is_tile = !reader.probeConstLeaf(origin);
+        for (int axis = 0; axis < 3; ++axis) {
+            Coord beyond = origin;
+            beyond[axis] += kDim;
+            const bool are_seen = !is_tile || reader.probeConstLeaf(beyond);
             for (int x = 0; x < kDim; ++x) {
-                crossed_[axis][x] = inside_at(sides, x, Coord(0)) ^ inside_at(sides, x, unit(axis));
+                const Bits crossed = inside_at(sides, x, Coord(0)) ^ inside_at(sides, x, unit(axis));
+                crossed_[axis][x] = are_seen ? crossed : 0;
                 first_[axis][x] = count_;
                 count_ += count_of(crossed_[axis][x]);
             }
+        }
     }
     const Coord& origin() const { return origin_; }
     /// From now on they are numbered from `first` on; returns where the next block's begin.
@@ -60,9 +68,11 @@ public:
             for (int& of_layer : of_axis) of_layer += first;
         return first + count_;
     }
-    /// The number of the crossed edge along an axis from the node at bit 8 y + z of layer x.
+    /// The number of the edge along an axis from the node at bit 8 y + z of layer x; -1 if it is none of
+    /// them.
     int number(int axis, int x, int bit) const {
-        return first_[axis][x] + count_of(crossed_[axis][x] & ((Bits{1} << bit) - 1));
+        const Bits crossed = crossed_[axis][x];
+        return (crossed >> bit & 1) != 0 ? first_[axis][x] + count_of(crossed & ((Bits{1} << bit) - 1)) : -1;
     }
 
 private:
@@ -71,25 +81,7 @@ private:
     int first_[3][kDim], count_ = 0;
 };
 
-/// The parts of tiles, by their origins, that nodes in the lowest layers of a leaf are on the other side of.
-template <typename Visit>
-void for_each_tile_below(const Leaf& leaf, const LeafSides& sides, TreeReader& reader, const Visit& visit) {
-    constexpr Bits kRow = 0xff, kColumn = 0x0101010101010101;
-    for (int lower = 1; lower < 8; ++lower) {
-        const Coord below(lower >> 2, lower >> 1 & 1, lower & 1);
-        const Coord origin = leaf.origin().offsetBy(-kDim * below.x(), -kDim * below.y(), -kDim * below.z());
-        if (reader.probeConstLeaf(origin)) continue;
-        const Bits beside = (below.y() ? kRow : ~Bits{0}) & (below.z() ? kColumn : ~Bits{0}),
-                   tile = reader.getValue(origin) < 0.0f ? ~Bits{0} : 0;
-        for (int x = 0; x < (below.x() ? 1 : kDim); ++x)
-            if (((sides.word(x, 0, 0) ^ tile) & beside) != 0) {
-                visit(origin);
-                break;
-            }
-    }
-}
-
-/// All that have nodes on both sides, or next to such.
+/// All that have nodes on both sides, one beyond the upper ends included.
 std::vector<Block> mixed_blocks(const openvdb::FloatTree& tree) {
     const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(tree);
     struct Found {
@@ -97,19 +89,21 @@ std::vector<Block> mixed_blocks(const openvdb::FloatTree& tree) {
         std::vector<Coord> tiles;
     };
     tbb::enumerable_thread_specific<Found> found_by_threads;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.leafCount(), kBlocks),
-                      [&](const auto& range) {
-                          Found& found = found_by_threads.local();
-                          TreeReader reader(tree);
-                          LeafSigns signs;
-                          for (std::size_t n = range.begin(); n < range.end(); ++n) {
-                              const Leaf& leaf = leaves.leaf(n);
-                              const LeafSides sides(leaf, reader, signs);
-                              if (sides.are_mixed()) found.blocks.emplace_back(leaf.origin(), sides);
-                              for_each_tile_below(leaf, sides, reader,
-                                                  [&](const Coord& tile) { found.tiles.push_back(tile); });
-                          }
-                      });
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, leaves.leafCount(), kBlocks), [&](const auto& range) {
+            Found& found = found_by_threads.local();
+            TreeReader reader(tree);
+            LeafSigns signs;
+            for (std::size_t n = range.begin(); n < range.end(); ++n) {
+                const Leaf& leaf = leaves.leaf(n);
+                const LeafSides sides(leaf, reader, signs);
+                if (sides.are_mixed()) found.blocks.emplace_back(leaf.origin(), sides, reader);
+                for_each_tile_below(leaf, sides, reader, [&](const Coord& below, bool) {
+                    found.tiles.push_back(
+                        leaf.origin().offsetBy(-kDim * below.x(), -kDim * below.y(), -kDim * below.z()));
+                });
+            }
+        });
     std::vector<Block> result;
     std::vector<Coord> tiles;
     for (const Found& found : found_by_threads) {
@@ -120,7 +114,8 @@ std::vector<Block> mixed_blocks(const openvdb::FloatTree& tree) {
     tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
     TreeReader reader(tree);
     LeafSigns signs;
-    for (const Coord& tile : tiles) result.emplace_back(tile, LeafSides(tile, nullptr, reader, signs));
+    for (const Coord& tile : tiles)
+        result.emplace_back(tile, LeafSides(tile, nullptr, reader, signs), reader);
     return result;
 }
 
@@ -160,7 +155,7 @@ private:
 /// Joins the crossed edges of the faces that have their lowest node in a block.
 class FaceJoiner {
 public:
-    /// `above`: the next blocks along each axis, null where no crossed edge has its lower end.
+    /// `above`: the next blocks along each axis, null where none of the edges that are seen begins.
     FaceJoiner(const Block& block, const Block* const (&above)[3], const LeafSides& sides, TreeReader& reader,
                SharedSets& sets)
         : block_(block), above_(above), sides_(sides), reader_(reader), sets_(sets) {}
@@ -212,13 +207,8 @@ private:
         });
     }
 
-    /// Calls `visit(bit)` for each that is set.
-    template <typename Visit>
-    static void for_each_bit(Bits bits, const Visit& visit) {
-        for (; bits != 0; bits &= bits - 1) visit(__builtin_ctzll(bits));
-    }
-
-    /// The number of an edge of the face from a node: along `axis`, on one of its sides across it.
+    /// The number of an edge of the face from a node: along `axis`, on one of its sides across it. -1 for one
+    /// between two tiles.
     int edge(int axis, int across, int side, int x, int bit) const {
         int at[3] = {x, bit / kDim, bit % kDim};
         const Block* block = &block_;
@@ -244,12 +234,12 @@ private:
 
 std::size_t count_components(const openvdb::FloatTree& tree) {
     std::vector<Block> blocks = mixed_blocks(tree);
-    std::unordered_map<Coord, const Block*, std::hash<Coord>> at;
+    std::unordered_map<Coord, const Block*, std::hash<Coord>> at;  // in blocks: low bits count in the hash
     at.reserve(blocks.size());
     int edges = 0;
     for (Block& block : blocks) {
         edges = block.number_from(edges);
-        at.emplace(block.origin(), &block);
+        at.emplace(block.origin() >> kLog2Dim, &block);
     }
     SharedSets sets(static_cast<std::size_t>(edges));
     const std::size_t joined = tbb::parallel_reduce(
@@ -261,9 +251,7 @@ std::size_t count_components(const openvdb::FloatTree& tree) {
                 const Coord& origin = blocks[b].origin();
                 const Block* above[3];
                 for (int axis = 0; axis < 3; ++axis) {
-                    Coord beyond = origin;
-                    beyond[axis] += kDim;
-                    const auto next = at.find(beyond);
+                    const auto next = at.find((origin >> kLog2Dim) + unit(axis));
                     above[axis] = next == at.end() ? nullptr : next->second;
                 }
                 const LeafSides sides(origin, reader.probeConstLeaf(origin), reader, signs);

@@ -20,12 +20,6 @@ using Bits = std::uint64_t;
 
 constexpr int kDim = LeafSides::kDim;
 
-/// Calls `visit(bit)` for each that is set.
-template <typename Visit>
-void for_each_bit(Bits bits, const Visit& visit) {
-    for (; bits != 0; bits &= bits - 1) visit(__builtin_ctzll(bits));
-}
-
 constexpr int kStride[3] = {kDim * kDim, kDim, 1};
 
 /// Of the node at bit `i` of a layer of a leaf across `axis`, the one number `at`.

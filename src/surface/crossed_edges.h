@@ -19,8 +19,8 @@ struct CrossedEdge {
     std::int8_t axis;
     bool outward;    ///< `from` is the end inside.
     bool at_border;  ///< One end is an inactive voxel.
-    /// A bit for each axis above its own: the face that it spans with one step along that axis may have its
-    /// two inside nodes across a diagonal. Where `from` is in a leaf it is known to, else not looked at.
+    /// A bit for each axis above its own, set where the face that it spans with one step along that axis has
+    /// its two inside nodes across a diagonal. All are where `from` is in a tile: there it is not known.
     std::uint8_t saddles;
 
     Vec3 index() const {

@@ -14,6 +14,12 @@
 
 namespace isotrack {
 
+/// Calls `visit(bit)` for each that is set.
+template <typename Visit>
+void for_each_bit(std::uint64_t bits, const Visit& visit) {
+    for (; bits != 0; bits &= bits - 1) visit(__builtin_ctzll(bits));
+}
+
 /// An accessor that its tree does not know of, and must outlive it.
 using TreeReader = openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>;
 
@@ -154,5 +160,27 @@ private:
 
     std::uint64_t word_[kDim + 1][2][2];
 };
+
+/// Calls `visit(below, tile_inside)` for the parts of tiles next to a leaf that are before it along the axes
+/// where `below` is 1, one at least, unless all nodes beside them, of the leaf and one beyond its upper ends,
+/// are on the side of the tile.
+template <typename Visit>
+void for_each_tile_below(const LeafSides::Leaf& leaf, const LeafSides& sides, TreeReader& reader,
+                         const Visit& visit) {
+    constexpr int kDim = LeafSides::kDim;
+    for (int lower = 1; lower < 8; ++lower) {
+        const openvdb::Coord below(lower >> 2, lower >> 1 & 1, lower & 1);
+        const openvdb::Coord home =
+            leaf.origin().offsetBy(-kDim * below.x(), -kDim * below.y(), -kDim * below.z());
+        if (reader.probeConstLeaf(home)) continue;
+        const bool tile_inside = reader.getValue(home) < 0.0f;
+        const unsigned bits = below.z() ? 1u : 0x1ffu;
+        bool all_same = true;
+        for (int x = 0; x <= (below.x() ? 0 : kDim); ++x)
+            for (int y = 0; y <= (below.y() ? 0 : kDim); ++y)
+                all_same = all_same && (sides.row(x, y) & bits) == (tile_inside ? bits : 0u);
+        if (!all_same) visit(below, tile_inside);
+    }
+}
 
 }  // namespace isotrack

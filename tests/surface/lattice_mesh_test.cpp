@@ -8,11 +8,15 @@
 #include <cmath>
 #include <random>
 #include <set>
+#include <utility>
+#include <vector>
 
+#include "disjoint_sets.h"
 #include "isotrack/compare/baselines.h"
 #include "isotrack/meshing/mesh_topology.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "isotrack/surface/level_set.h"
+#include "surface/ambiguous_faces.h"
 #include "surface/float_precision.h"
 
 namespace isotrack {
@@ -139,6 +143,119 @@ TEST(LatticeMesh, HasTheComponentsThatHangTogetherAlongTheBorderOfItsLeaves) {
         EXPECT_EQ(block.lattice_component_count(), theirs.components) << side;
         EXPECT_EQ(block.lattice_euler(), theirs.euler) << side;
     }
+}
+
+/// Of full leaves and tiles, by their places in leaves; outside elsewhere.
+openvdb::FloatGrid::Ptr blocks(const std::vector<openvdb::Coord>& inside_leaves,
+                               const std::vector<openvdb::Coord>& inside_tiles) {
+    auto grid = openvdb::FloatGrid::create(1.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    constexpr int kLeaf = 8;
+    for (const openvdb::Coord& tile : inside_tiles)
+        grid->tree().addTile(1, openvdb::Coord(kLeaf * tile.x(), kLeaf * tile.y(), kLeaf * tile.z()), -1.0f,
+                             false);
+    for (const openvdb::Coord& leaf : inside_leaves)
+        grid->tree()
+            .touchLeaf(openvdb::Coord(kLeaf * leaf.x(), kLeaf * leaf.y(), kLeaf * leaf.z()))
+            ->fill(-0.5f, true);
+    return grid;
+}
+
+TEST(LatticeMesh, HasNoComponentsBetweenTiles) {
+    // All edges of an inside tile but those next to the leaf are between tiles.
+    const LevelSet beside(blocks({{1, 1, 0}}, {{0, 0, 0}}));
+    EXPECT_EQ(beside.lattice_component_count(), 1u);
+}
+
+TEST(LatticeMesh, HasComponentsThatHangTogetherInFacesThatBeginInATile) {
+    // A cavity around the upper corner of a leaf, of seven tiles: its walls meet at edges that begin in the
+    // three blocks below that leaf, which are leaves or tiles.
+    std::vector<openvdb::Coord> others, below{{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
+    for (auto c = openvdb::CoordBBox(openvdb::Coord(-1), openvdb::Coord(2)).begin(); c; ++c) {
+        const bool in_cavity =
+            openvdb::CoordBBox(openvdb::Coord(0), openvdb::Coord(1)).isInside(*c) && *c != openvdb::Coord(0);
+        if (!in_cavity && std::find(below.begin(), below.end(), *c) == below.end()) others.push_back(*c);
+    }
+    EXPECT_EQ(LevelSet(blocks(others, below)).lattice_component_count(), 2u);
+    others.insert(others.end(), below.begin(), below.end());
+    EXPECT_EQ(LevelSet(blocks(others, {})).lattice_component_count(), 2u);
+}
+
+/// The crossed edges that have an end in a leaf, joined face by face; all are within `kSide` nodes.
+std::size_t components_face_by_face(const openvdb::FloatTree& tree) {
+    constexpr int kLow = -2, kSide = 28;
+    const auto inside = [&](const openvdb::Coord& c) { return tree.getValue(c) < 0.0f; };
+    const auto step = [](const openvdb::Coord& c, int axis, int by = 1) {
+        openvdb::Coord result = c;
+        result[axis] += by;
+        return result;
+    };
+    const auto is_seen = [&](const openvdb::Coord& c, int axis) {
+        const openvdb::Coord to = step(c, axis);
+        return inside(c) != inside(to) && (tree.probeConstLeaf(c) || tree.probeConstLeaf(to));
+    };
+    const auto number = [](const openvdb::Coord& c, int axis) {
+        return (((c.x() - kLow) * kSide + c.y() - kLow) * kSide + c.z() - kLow) * 3 + axis;
+    };
+    DisjointSets edges(static_cast<std::size_t>(kSide) * kSide * kSide * 3);
+    std::size_t components = 0;
+    for (auto c = openvdb::CoordBBox(openvdb::Coord(kLow), openvdb::Coord(kLow + kSide - 2)).begin(); c;
+         ++c) {
+        for (int axis = 0; axis < 3; ++axis) components += is_seen(*c, axis);
+        for (int u = 0; u < 3; ++u)
+            for (int w = u + 1; w < 3; ++w) {
+                using Edge = std::pair<openvdb::Coord, int>;
+                const auto join = [&](const Edge& a, const Edge& b) {
+                    if (is_seen(a.first, a.second) && is_seen(b.first, b.second))
+                        components -= edges.join(number(a.first, a.second), number(b.first, b.second));
+                };
+                const Edge around[] = {{*c, u}, {step(*c, u), w}, {step(*c, w), u}, {*c, w}};
+                std::vector<Edge> crossed;
+                for (const Edge& edge : around)
+                    if (inside(edge.first) != inside(step(edge.first, edge.second))) crossed.push_back(edge);
+                if (crossed.size() == 2) join(crossed[0], crossed[1]);
+                if (crossed.size() < 4) continue;
+                const bool low = inside(*c),
+                           joined = joins_diagonal([&](int side, int a, int b) {
+                               const openvdb::Coord corner = step(step(*c, u, low ? a : 1 - a), w, b);
+                               return inside(step(corner, 3 - u - w, side == 0 ? -1 : 1));
+                           });
+                const bool cuts_off_low = low != joined;  // and the one across
+                join(around[0], around[cuts_off_low ? 3 : 1]);
+                join(around[2], around[cuts_off_low ? 1 : 3]);
+            }
+    }
+    return components;
+}
+
+TEST(LatticeMesh, HasTheComponentsOfLeavesAndTilesInAnyOrder) {
+    std::mt19937 random(11);
+    std::size_t most = 0;
+    for (int round = 0; round < 60; ++round) {
+        std::vector<openvdb::Coord> leaves, tiles;
+        for (auto c = openvdb::CoordBBox(openvdb::Coord(0), openvdb::Coord(2)).begin(); c; ++c)
+            switch (random() % 4) {
+                case 0:
+                    tiles.push_back(*c);
+                    break;
+                case 1:
+                    leaves.push_back(*c);
+                    break;
+                default:
+                    break;
+            }
+        const openvdb::FloatGrid::Ptr grid = blocks(leaves, tiles);
+        auto values = grid->getAccessor();
+        for (int i = 0; i < 40 * (round % 3); ++i) {  // which makes leaves of tiles
+            const auto coordinate = [&] { return static_cast<int>(random() % 24); };
+            const openvdb::Coord node(coordinate(), coordinate(), coordinate() / 8);
+            values.setValue(node, random() % 2 == 0 ? -0.5f : 0.5f);
+        }
+        const std::size_t expected = components_face_by_face(grid->tree());
+        EXPECT_EQ(LevelSet(grid).lattice_component_count(), expected) << round;
+        most = std::max(most, expected);
+    }
+    EXPECT_GT(most, 10u);
 }
 
 TEST(LatticeMesh, OfABallIsOnIt) {
