@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "delaunay/circumcentre.h"
+#include "meshing/triangle_box.h"
 #include "meshing/triangle_distance.h"
 #include "meshing/triangle_quadratic.h"
 #include "parallel_for_each.h"
@@ -316,12 +317,12 @@ std::vector<float> distances_within(double reach, const std::vector<Vec3>& point
     parallel_for_each(triangles.size(), kTriangles, [&](std::size_t t) {
         const Vec3 &a = points[triangles[t][0]], &b = points[triangles[t][1]], &c = points[triangles[t][2]];
         std::optional<FacingTriangle> triangle;  // where crossings are few, most are far from all
-        grid.for_each_in(Box(a.cwiseMin(b).cwiseMin(c) - around, a.cwiseMax(b).cwiseMax(c) + around),
-                         [&](std::size_t i) {
-                             if (!triangle) triangle.emplace(a, b, c);
-                             const double limit = std::min(reach * reach, least[i].get());
-                             least[i].take(triangle->squared_distance(grid[i], limit));
-                         });
+        const Box box = box_of(points, triangles[t]);
+        grid.for_each_in(Box(box.min() - around, box.max() + around), [&](std::size_t i) {
+            if (!triangle) triangle.emplace(a, b, c);
+            const double limit = std::min(reach * reach, least[i].get());
+            least[i].take(triangle->squared_distance(grid[i], limit));
+        });
     });
     std::vector<float> distances(grid.size());
     parallel_for_each(grid.size(), kCrossings, [&](std::size_t i) {

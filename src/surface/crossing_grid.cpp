@@ -1,6 +1,7 @@
 #include "isotrack/surface/crossing_grid.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <atomic>
 #include <cmath>
@@ -124,7 +125,7 @@ CrossingGrid CrossingGrid::some(std::vector<int>& numbers) const {
         ++result.first_[places.back().column + 1];
     }
     std::partial_sum(result.first_.begin(), result.first_.end(), result.first_.begin());
-    std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+    tbb::parallel_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
         return std::tie(a.column, a.z, a.number) < std::tie(b.column, b.z, b.number);
     });
     result.entries_.reserve(places.size());

@@ -45,6 +45,7 @@ public:
         double sum_of_squares = 0.0,
                weight = 0.0;  ///< Of these, each counted as many times as it stands for.
     };
+    /// Remembers the farthest: the next `measure` after some changes looks no farther.
     Survey survey(double limit);
 
     const CrossingGrid& points() const { return points_; }
@@ -54,7 +55,9 @@ private:
     const CrossingGrid& points_;
     const double cutoff_;
     std::vector<float> distances_;  // empty: not measured yet
-    double reach_;                  // none that is found is larger, as far as it was looked at
+    // The farthest that the last survey found, if none was lost and nothing was measured since; else the
+    // cutoff.
+    double reach_;
 };
 
 }  // namespace isotrack

@@ -197,6 +197,10 @@ TEST(SelfIntersections, AgreesWithConstructedIntersectionsOnCrossingSurfaces) {
     const Pairs pairs = self_intersections(mesh);
     EXPECT_GT(pairs.size(), 100u);
     EXPECT_EQ(pairs, intersections_by_construction(mesh));
+    // So many that they are cut into slabs, though one could hold them.
+    const TriangleMesh larger = support::join(support::icosphere(3), support::torus(36, 18, 0.9, 0.3));
+    EXPECT_GT(larger.triangles.size(), 2048u);
+    EXPECT_EQ(self_intersections(larger), intersections_by_construction(larger));
 }
 
 TEST(SelfIntersections, FindsTheSamePairsWhereverTheSlabsAreCutAndAtAnyThreadCount) {

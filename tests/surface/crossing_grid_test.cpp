@@ -71,5 +71,34 @@ TEST(CrossingGrid, FindsWhatIsInABox) {
         }
 }
 
+TEST(CrossingGrid, FindsSomeAloneAsWell) {
+    const auto torus = shapes::torus({0.1, 0.2, 0.3}, 1.0, 0.4, kResolution);
+    const CrossingGrid grid(*torus);
+    for (const std::size_t every : {1, 3, 200}) {
+        std::vector<int> numbers, wanted;
+        for (std::size_t c = grid.size(); c-- > 0;)
+            if (c % every == 0) numbers.push_back(static_cast<int>(c));
+        std::vector<int> before = numbers;
+        const CrossingGrid some = grid.some(numbers);
+        ASSERT_EQ(some.size(), numbers.size());
+        for (std::size_t i = 0; i < some.size(); ++i) {
+            EXPECT_EQ(row_of(some[i]), row_of(grid[numbers[i]]));
+            EXPECT_EQ(some[i].stands_for, grid[numbers[i]].stands_for);
+        }
+        const Box box(Vec3(0.3, 0.1, 0.2), Vec3(0.9, 1.1, 0.8));
+        for (const int c : before)
+            if (box.contains(grid[c].point)) wanted.push_back(c);
+        std::vector<int> found;
+        some.for_each_in(box, [&](std::size_t i) { found.push_back(numbers[i]); });
+        for (std::vector<int>* list : {&before, &numbers, &wanted, &found})
+            std::sort(list->begin(), list->end());
+        EXPECT_EQ(numbers, before);
+        EXPECT_EQ(found, wanted);
+        EXPECT_FALSE(found.empty());
+    }
+    std::vector<int> none;
+    EXPECT_TRUE(grid.some(none).empty());
+}
+
 }  // namespace
 }  // namespace isotrack

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -45,6 +46,42 @@ TEST(MeshDistances, AfterChangesAreThoseMeasuredAnew) {
             EXPECT_NE(anew, before);
             for (std::size_t c = 0; c < grid.size(); ++c) EXPECT_EQ(distances[c], anew[c]) << c;
         }
+}
+
+TEST(MeshDistances, AfterChangesInARowAreThoseMeasuredAnew) {
+    // Of a mesh that was near everywhere, the first change takes a corner away from crossings.
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const CrossingGrid grid(*sphere);
+    constexpr double kCutoff = 1.0;
+    constexpr int kMoved = 5;
+    TriangleMesh mesh = support::icosphere(2, {0, 0, 0}, 1.0);
+    for (Vec3& p : mesh.points) p = to_float_precision(p);
+    const auto facets = [&] {
+        std::vector<Facet> result;
+        const auto corner = [&](int v) { return Eigen::Vector3f(mesh.points[v].cast<float>()); };
+        for (const auto& [i, j, k] : mesh.triangles)
+            if (i == kMoved || j == kMoved || k == kMoved)
+                result.push_back({0, {corner(i), corner(j), corner(k)}});
+        return result;
+    };
+    MeshDistances distances(grid, kCutoff);
+    distances.measure(mesh.points, mesh.triangles, {});
+    const double at_first = distances.survey(kCutoff).farthest;
+    double farthest = 0.0;
+    for (const double factor : {0.6, 1.5}) {
+        FacetChanges changes;
+        changes.went = facets();
+        mesh.points[kMoved] = to_float_precision(factor * mesh.points[kMoved]);
+        changes.came = facets();
+        changes.around = triangles_near_gone(changes.went, 2.01 * kCutoff, mesh.points, mesh.triangles);
+        distances.measure(mesh.points, mesh.triangles, changes);
+        const auto anew = crossing_distances(mesh.points, mesh.triangles, grid, kCutoff);
+        for (std::size_t c = 0; c < grid.size(); ++c) {
+            EXPECT_EQ(distances[c], anew[c]) << factor << " " << c;
+            farthest = std::max(farthest, distances[c]);
+        }
+    }
+    EXPECT_GT(farthest, 2.0 * at_first);
 }
 
 TEST(MeshDistances, WhatTakesOverMayBeTwoCutoffsFromWhatWent) {

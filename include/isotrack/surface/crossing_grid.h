@@ -35,7 +35,7 @@ public:
     bool thinned_out(const Surface& surface) const { return spacing_ >= 2.0 * surface.resolution(); }
 
     /// Some of them alone, found by place: the one with index i is that with index `numbers[i]` here. To that
-    /// end `numbers` are put into another order.
+    /// end `numbers`, all below `size()`, are put into another order.
     CrossingGrid some(std::vector<int>& numbers) const;
 
     /// Calls `visit` with the index of every crossing in `box`.
