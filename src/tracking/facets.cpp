@@ -1,9 +1,9 @@
 #include "tracking/facets.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <utility>
+
+#include "parallel_for_each.h"
 
 namespace isotrack {
 
@@ -20,12 +20,13 @@ Facet MeshFacets::operator[](std::size_t triangle) const {
             {vertices_[i].cast<float>(), vertices_[j].cast<float>(), vertices_[k].cast<float>()}};
 }
 
-void MeshFacets::write_to(std::vector<Facet>& facets) const {
-    facets = std::vector<Facet>();  // first, as there are many
-    facets.resize(size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 1024), [&](const auto& range) {
-        for (std::size_t t = range.begin(); t < range.end(); ++t) facets[t] = (*this)[t];
+KeptFacets::KeptFacets(const CarvedSurface& carved, const std::vector<Vec3>& vertices)
+    : kept_(carved.triangles.size()), place_(vertices.size()) {
+    constexpr std::size_t kGrain = 1024;
+    parallel_for_each(kept_.size(), kGrain, [&](std::size_t t) {
+        kept_[t] = {facet_key(carved, t), carved.triangles[t]};
     });
+    parallel_for_each(place_.size(), kGrain, [&](std::size_t v) { place_[v] = vertices[v].cast<float>(); });
 }
 
 std::vector<std::array<std::size_t, 2>> same_corners(const std::vector<Facet>& came,

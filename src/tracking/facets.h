@@ -32,11 +32,30 @@ public:
         : carved_(carved), vertices_(vertices) {}
     std::size_t size() const { return carved_.triangles.size(); }
     Facet operator[](std::size_t triangle) const;
-    void write_to(std::vector<Facet>& facets) const;
 
 private:
     const CarvedSurface& carved_;
     const std::vector<Vec3>& vertices_;
+};
+
+/// The same when the mesh is another, in half of their memory.
+class KeptFacets {
+public:
+    KeptFacets() = default;
+    KeptFacets(const CarvedSurface& carved, const std::vector<Vec3>& vertices);
+    std::size_t size() const { return kept_.size(); }
+    Facet operator[](std::size_t triangle) const {
+        const auto& [key, corner] = kept_[triangle];
+        return {key, {place_[corner[0]], place_[corner[1]], place_[corner[2]]}};
+    }
+
+private:
+    struct Kept {
+        int key;
+        Triangle corner;
+    };
+    std::vector<Kept> kept_;
+    std::vector<Eigen::Vector3f> place_;  // of each vertex
 };
 
 /// Calls `same` with the numbers of each facet that is in both, in `now` and in `before`; `came` with those

@@ -119,7 +119,7 @@ double Inspector::cutoff() const {
 
 void Inspector::restart() {
     expected_.reset();
-    facets_ = std::vector<Facet>();  // there are many
+    facets_ = {};
     errors_.reset();
     forget_distances();
     looked_at_topology_ = false;
@@ -221,7 +221,8 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     }
     errors_ = result.errors = measured;  // first: the errors before have no use any more
     expected_.reset();                   // vertices may move from now on
-    facets.write_to(facets_);
+    facets_ = {};                        // first: there are many
+    facets_ = {mesh.carved, mesh.vertices};
     return in_vain;
 }
 

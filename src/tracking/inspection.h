@@ -126,7 +126,7 @@ private:
         std::vector<FacetError> errors;
     };
     std::optional<Expected> expected_;                       // before the first inspection
-    std::vector<Facet> facets_;                              // of the last inspection
+    KeptFacets facets_;                                      // of the last inspection
     std::shared_ptr<const std::vector<FacetError>> errors_;  // of each
     FacetChanges changes_;                                   // since the inspection before
     std::optional<BetweenCrossings> between_crossings_;
