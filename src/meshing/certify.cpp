@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "delaunay/circumcentre.h"
 #include "meshing/triangle_box.h"
@@ -333,15 +334,24 @@ std::vector<float> distances_within(double reach, const std::vector<Vec3>& point
     return distances;
 }
 
+/// The distances of some crossings, found by `measure` of their grid, into their entries.
+template <typename Measure>
+void measure_some(const CrossingGrid& grid, std::vector<int> some, const Measure& measure,
+                  std::vector<float>& distances) {
+    if (some.empty()) return;
+    const std::vector<float> found = measure(grid.some(some));
+    for (std::size_t i = 0; i < some.size(); ++i) distances[some[i]] = found[i];
+}
+
 }  // namespace
 
 void crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                         const CrossingGrid& grid, std::vector<int> some, double cutoff,
                         std::vector<float>& distances) {
-    if (some.empty()) return;
-    const CrossingGrid few = grid.some(some);
-    const std::vector<float> found = crossing_distances(points, triangles, few, cutoff);
-    for (std::size_t i = 0; i < some.size(); ++i) distances[some[i]] = found[i];
+    const auto measure = [&](const CrossingGrid& few) {
+        return crossing_distances(points, triangles, few, cutoff);
+    };
+    measure_some(grid, std::move(some), measure, distances);
 }
 
 std::vector<float> crossing_distances(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
@@ -351,10 +361,10 @@ std::vector<float> crossing_distances(const std::vector<Vec3>& points, const std
     std::vector<int> left;
     for (std::size_t i = 0; i < distances.size(); ++i)
         if (std::isinf(distances[i])) left.push_back(static_cast<int>(i));
-    if (left.empty()) return distances;
-    const CrossingGrid far = grid.some(left);
-    const std::vector<float> found = distances_within(cutoff, points, triangles, far);
-    for (std::size_t i = 0; i < left.size(); ++i) distances[left[i]] = found[i];
+    const auto measure = [&](const CrossingGrid& far) {
+        return distances_within(cutoff, points, triangles, far);
+    };
+    measure_some(grid, std::move(left), measure, distances);
     return distances;
 }
 

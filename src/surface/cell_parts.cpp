@@ -114,7 +114,7 @@ long parts_in(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
 /// Of the cells that have their least node in a tile, and in this leaf the first on the other side.
 long parts_below(const Leaf& leaf, const LeafSides& sides, TreeReader& reader) {
     long result = 0;
-    for_each_tile_below(leaf, sides, reader, [&](const Coord& below, bool tile_inside) {
+    for_each_tile_below(leaf, sides, reader, [&](const Coord&, const Coord& below, bool tile_inside) {
         const auto end = [&](int axis) { return below[axis] ? 0 : kDim; };
         const auto begin = [&](int axis) { return -below[axis]; };
         for (int x = begin(0); x < end(0); ++x)

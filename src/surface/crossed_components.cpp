@@ -98,9 +98,8 @@ std::vector<Block> mixed_blocks(const openvdb::FloatTree& tree) {
                 const Leaf& leaf = leaves.leaf(n);
                 const LeafSides sides(leaf, reader, signs);
                 if (sides.are_mixed()) found.blocks.emplace_back(leaf.origin(), sides, reader);
-                for_each_tile_below(leaf, sides, reader, [&](const Coord& below, bool) {
-                    found.tiles.push_back(
-                        leaf.origin().offsetBy(-kDim * below.x(), -kDim * below.y(), -kDim * below.z()));
+                for_each_tile_below(leaf, sides, reader, [&](const Coord& tile, const Coord&, bool) {
+                    found.tiles.push_back(tile);
                 });
             }
         });

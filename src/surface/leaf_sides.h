@@ -161,9 +161,9 @@ private:
     std::uint64_t word_[kDim + 1][2][2];
 };
 
-/// Calls `visit(below, tile_inside)` for the parts of tiles next to a leaf that are before it along the axes
-/// where `below` is 1, one at least, unless all nodes beside them, of the leaf and one beyond its upper ends,
-/// are on the side of the tile.
+/// Calls `visit(origin, below, tile_inside)` for the parts of tiles next to a leaf that are before it along
+/// axes where `below` is 1, one at least, unless all nodes beside them, of the leaf and one beyond its upper
+/// ends, are on the side of the tile.
 template <typename Visit>
 void for_each_tile_below(const LeafSides::Leaf& leaf, const LeafSides& sides, TreeReader& reader,
                          const Visit& visit) {
@@ -179,7 +179,7 @@ void for_each_tile_below(const LeafSides::Leaf& leaf, const LeafSides& sides, Tr
         for (int x = 0; x <= (below.x() ? 0 : kDim); ++x)
             for (int y = 0; y <= (below.y() ? 0 : kDim); ++y)
                 all_same = all_same && (sides.row(x, y) & bits) == (tile_inside ? bits : 0u);
-        if (!all_same) visit(below, tile_inside);
+        if (!all_same) visit(home, below, tile_inside);
     }
 }
 
