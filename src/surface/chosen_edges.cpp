@@ -133,39 +133,41 @@ std::vector<StandIn> thin_out(const CrossedEdges& crossed, int cube, int wide) {
     const auto cubes_of_leaf = [](int size) {
         return static_cast<std::size_t>(size < kDim ? std::pow(kDim / size, 3) : 1);
     };
-    const PartsInCubes parts(crossed.parts, wide);
+    const PartsInCubes parts(crossed.parts(), wide);
     const auto find = [&](std::size_t begin, std::size_t end, std::vector<StandIn>& found) {
         std::vector<FlatCube> wide_cubes(cubes_of_leaf(wide));
         std::vector<AnyCube> cubes(cubes_of_leaf(cube));
         for (std::size_t n = begin; n < end; ++n) {
             const auto for_each_edge = [&](const CrossedEdges::Part& part, const auto& visit) {
-                for (std::size_t e = part.begin; e < part.end; ++e) {
-                    const Coord in_leaf = crossed.edges[e].from - part.origin;
-                    visit(e, in_leaf, wide_cubes[wide < kDim ? number_of(in_leaf, wide) : 0]);
-                }
+                crossed.for_each_of(part, [&](std::size_t e, const CrossedEdge& edge) {
+                    const Coord in_leaf = edge.from - part.origin;
+                    visit(e, edge, in_leaf, wide_cubes[wide < kDim ? number_of(in_leaf, wide) : 0]);
+                });
             };
             std::fill(wide_cubes.begin(), wide_cubes.end(), FlatCube());
             parts.for_each_in(n, [&](std::size_t part) {
-                for_each_edge(crossed.parts[part], [&](std::size_t e, const Coord&, FlatCube& around) {
-                    ++around.count[FlatCube::direction(crossed.edges[e])];
-                });
+                for_each_edge(crossed.parts()[part],
+                              [&](std::size_t, const CrossedEdge& edge, const Coord&, FlatCube& around) {
+                                  ++around.count[FlatCube::direction(edge)];
+                              });
             });
             for (FlatCube& c : wide_cubes) c.take_counts();
             parts.for_each_in(n, [&](std::size_t part) {
-                for_each_edge(crossed.parts[part], [&](std::size_t e, const Coord&, FlatCube& around) {
-                    if (around.goes_one_way) around.take_place(e, crossed.edges[e]);
-                });
+                for_each_edge(crossed.parts()[part],
+                              [&](std::size_t e, const CrossedEdge& edge, const Coord&, FlatCube& around) {
+                                  if (around.goes_one_way) around.take_place(e, edge);
+                              });
             });
             for (FlatCube& c : wide_cubes) c.judge(wide);
             parts.for_each_in(n, [&](std::size_t part) {
                 bool any_other = false;
-                for_each_edge(crossed.parts[part],
-                              [&](std::size_t e, const Coord& in_leaf, const FlatCube& around) {
-                                  if (around.flat) return;
-                                  if (!any_other) std::fill(cubes.begin(), cubes.end(), AnyCube());
-                                  any_other = true;
-                                  cubes[number_of(in_leaf, cube)].take(e, crossed.edges[e]);
-                              });
+                for_each_edge(crossed.parts()[part], [&](std::size_t e, const CrossedEdge& edge,
+                                                         const Coord& in_leaf, const FlatCube& around) {
+                    if (around.flat) return;
+                    if (!any_other) std::fill(cubes.begin(), cubes.end(), AnyCube());
+                    any_other = true;
+                    cubes[number_of(in_leaf, cube)].take(e, edge);
+                });
                 if (any_other)
                     for (const AnyCube& c : cubes) c.choose(found);
             });
@@ -207,13 +209,16 @@ std::vector<std::size_t> edges_near(const CrossedEdges& crossed, const std::vect
                 }
     }
     std::vector<std::size_t> found;
-    for (const auto& [origin, cubes] : wanted) {
+    for (const auto& leaf : wanted) {
+        const Coord& origin = leaf.first;
+        const std::vector<char>& is_wanted = leaf.second;
         const auto part = std::lower_bound(
-            crossed.parts.begin(), crossed.parts.end(), origin,
+            crossed.parts().begin(), crossed.parts().end(), origin,
             [](const CrossedEdges::Part& p, const Coord& there) { return comes_before(p.origin, there); });
-        if (part == crossed.parts.end() || part->origin != origin) continue;
-        for (std::size_t e = part->begin; e < part->end; ++e)
-            if (cubes[number_of(crossed.edges[e].from - origin, cube)]) found.push_back(e);
+        if (part == crossed.parts().end() || part->origin != origin) continue;
+        crossed.for_each_of(*part, [&](std::size_t e, const CrossedEdge& edge) {
+            if (is_wanted[number_of(edge.from - origin, cube)]) found.push_back(e);
+        });
     }
     return found;
 }

@@ -118,17 +118,16 @@ std::size_t count_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader&
     return result;
 }
 
-/// Writes them from `next` on, and returns how many of them are at the border.
-std::size_t write_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader& reader, CrossedEdge* next) {
+/// Calls `visit` with each, as many as are counted.
+template <typename Visit>
+void for_each_edge_of(const Leaf& leaf, const LeafSides& sides, TreeReader& reader, const Visit& visit) {
     const float* own = leaf.buffer().data();
     const Saddles saddles(sides);
     constexpr int kNotLookedAt = 7;
-    std::size_t at_border = 0;
     const auto add = [&](const Coord& from, int axis, float a, float b, bool active, int own_saddles) {
         const float fraction = std::clamp(a / (a - b), 0.0f, 1.0f);
-        *next++ = {from,     fraction, static_cast<std::int8_t>(axis),
-                   a < 0.0f, !active,  static_cast<std::uint8_t>(own_saddles)};
-        at_border += !active;
+        visit(CrossedEdge{from, fraction, static_cast<std::int8_t>(axis), a < 0.0f, !active,
+                          static_cast<std::uint8_t>(own_saddles)});
     };
     const auto is_on = [](const Leaf& of, int offset) {
         return of.isValueOn(static_cast<openvdb::Index>(offset));
@@ -156,7 +155,6 @@ std::size_t write_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader&
                 face.up ? saddles.of(face.axis, offset) : kNotLookedAt);
         });
     });
-    return at_border;
 }
 
 }  // namespace
@@ -184,21 +182,29 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
         cell_parts_of[n] = cell_parts(leaf, sides, reader);
     });
     CrossedEdges result;
-    result.finite = finite;
+    result.finite_ = finite;
     if (!finite) return result;
     std::partial_sum(first.begin(), first.end(), first.begin());
-    result.edges.resize(first.back());
+    result.packed_.resize(first.back());
     std::atomic<std::size_t> at_border{0};
     for_each_leaf([&](std::size_t n, const Leaf& leaf, TreeReader& reader, LeafSigns& signs) {
-        if (first[n] < first[n + 1])
-            at_border +=
-                write_edges_of(leaf, LeafSides(leaf, reader, signs), reader, &result.edges[first[n]]);
+        if (first[n] == first[n + 1]) return;
+        CrossedEdges::Packed* next = &result.packed_[first[n]];
+        std::size_t here = 0;
+        for_each_edge_of(leaf, LeafSides(leaf, reader, signs), reader, [&](const CrossedEdge& edge) {
+            *next++ = {edge, leaf.origin()};
+            here += edge.at_border;
+        });
+        at_border += here;
     });
     for (std::size_t n = 0; n < count; ++n)
         if (first[n] < first[n + 1])
-            result.parts.push_back({leaves.leaf(n).origin(), first[n], first[n + 1]});
-    result.cell_parts = std::accumulate(cell_parts_of.begin(), cell_parts_of.end(), 0L);
-    result.at_border = at_border;
+            result.parts_.push_back({leaves.leaf(n).origin(), first[n], first[n + 1]});
+    for (std::uint32_t part = 0; part < result.parts_.size(); ++part)
+        while (result.part_at_.size() * CrossedEdges::kStep < result.parts_[part].end)
+            result.part_at_.push_back(part);
+    result.cell_parts_ = std::accumulate(cell_parts_of.begin(), cell_parts_of.end(), 0L);
+    result.at_border_ = at_border;
     return result;
 }
 

@@ -42,16 +42,16 @@ struct Slope {
     double median = 0.0, mean = 0.0;
 };
 
-Slope slope_at_surface(const FloatTree& tree, const AffineMap& map,
-                       const UnsetVector<CrossedEdge>& crossings) {
+Slope slope_at_surface(const FloatTree& tree, const AffineMap& map, const CrossedEdges& crossings) {
     constexpr std::size_t kSamples = 4000;
     Stencil stencil(tree);
     std::vector<double> slopes;
     const std::size_t step = 1 + crossings.size() / kSamples;
     for (int pass = 0; pass < 2 && slopes.empty(); ++pass)  // the border only when there is nothing else
         for (std::size_t i = 0; i < crossings.size(); i += step) {
-            if (pass == 0 && crossings[i].at_border) continue;
-            const double slope = map.gradient_to_world(stencil.sample(crossings[i].index()).gradient).norm();
+            const CrossedEdge edge = crossings[i];
+            if (pass == 0 && edge.at_border) continue;
+            const double slope = map.gradient_to_world(stencil.sample(edge.index()).gradient).norm();
             if (std::isfinite(slope) && slope > 0.0) slopes.push_back(slope);
         }
     if (slopes.empty()) return {};
@@ -132,18 +132,18 @@ struct LevelSet::Impl {
         FloatGrid::Ptr own;
         CrossedEdges found;
         if (plain) found = find_crossed_edges(floats->constTree());
-        if (!plain || !found.finite) {
+        if (!plain || !found.finite()) {
             own = floats ? float_copy(*floats, options.iso, sign) : float_copy(*doubles, options.iso, sign);
             found = find_crossed_edges(own->constTree());
         }
         grid = own ? FloatGrid::ConstPtr(own) : floats;
 
-        if (found.edges.empty() && active_voxels > 0 && grid_class != openvdb::GRID_LEVEL_SET)
+        if (found.empty() && active_voxels > 0 && grid_class != openvdb::GRID_LEVEL_SET)
             throw InputError(
                 grid_label(*source) + " is not a level set: its values do not change sign around " +
                 std::to_string(options.iso) + " (class '" + openvdb::GridBase::gridClassToString(grid_class) +
                 "'); give an iso value inside its range");
-        const Slope in_grid_units = slope_at_surface(grid->constTree(), map, found.edges);
+        const Slope in_grid_units = slope_at_surface(grid->constTree(), map, found);
         refuse_beyond_band(options.iso, found, in_grid_units.median * map.voxel_size);
         scale = value_scale_for(in_grid_units.median, map.voxel_size, grid_class == openvdb::GRID_LEVEL_SET);
         if (!std::isfinite(static_cast<float>(scale)))
@@ -152,7 +152,7 @@ struct LevelSet::Impl {
                 " has values that hardly differ from voxel to voxel at its surface; multiply them to be "
                 "distances");
         if (in_grid_units.mean > 0.0) slope = std::min(1.0, scale * in_grid_units.mean);
-        border_crossings = found.at_border;
+        border_crossings = found.at_border();
 
         if (!own && scale != 1.0) grid = own = floats->deepCopy();
         if (own) {
@@ -167,10 +167,10 @@ struct LevelSet::Impl {
         crossed = std::move(found);
         leaves = LeafTable(grid->constTree());
         bounds = tbb::parallel_reduce(
-            tbb::blocked_range<std::size_t>(0, crossed.edges.size(), 4096), Box(),
+            tbb::blocked_range<std::size_t>(0, crossed.size(), 4096), Box(),
             [&](const auto& range, Box box) {
                 for (std::size_t e = range.begin(); e < range.end(); ++e)
-                    box.extend(map.to_world(crossed.edges[e].index()));
+                    box.extend(map.to_world(crossed[e].index()));
                 return box;
             },
             [](const Box& a, const Box& b) { return a.merged(b); });
@@ -191,9 +191,10 @@ struct LevelSet::Impl {
             ++to[edge.axis];
             return std::abs(reader.getValue(is_active(edge.from) ? to : edge.from)) < kNear * step;
         };
-        const auto cut = std::count_if(found.edges.begin(), found.edges.end(), is_cut);
-        if (iso >= end || (found.edges.empty() && -iso >= end) ||
-            static_cast<double>(cut) > kMostCut * static_cast<double>(found.edges.size()))
+        std::size_t cut = 0;
+        for (std::size_t e = 0; e < found.size(); ++e) cut += is_cut(found[e]);
+        if (iso >= end || (found.empty() && -iso >= end) ||
+            static_cast<double>(cut) > kMostCut * static_cast<double>(found.size()))
             throw InputError(grid_label(*source) + " has no room in its band for the iso value " +
                              std::to_string(iso) + ": the background is " + std::to_string(end) +
                              "; give one nearer to 0, or make the band wider");
@@ -314,7 +315,7 @@ private:
 Surface::CrossingSequence LevelSet::crossing_sequence(double apart) const {
     constexpr double kFlat = 4.01;  // of `apart`: cubes where the surface may be flat
     constexpr int kWidest = 64;     // voxels
-    const UnsetVector<CrossedEdge>& edges = impl_->crossed.edges;
+    const CrossedEdges& edges = impl_->crossed;
     const ToCrossing crossing(impl_->map);
     if (const int cube = cube_within(apart, resolution()); cube > 1) {
         std::vector<StandIn> some =
@@ -337,14 +338,14 @@ std::vector<Surface::Crossing> LevelSet::crossings_near(const std::vector<Vec3>&
     std::vector<Crossing> result;
     const ToCrossing crossing(impl_->map);
     for (const std::size_t e : edges_near(impl_->crossed, middles, voxels, cube_within(reach, resolution())))
-        result.push_back(crossing(impl_->crossed.edges[e]));
+        result.push_back(crossing(impl_->crossed[e]));
     return result;
 }
 namespace {
 
 /// What `add(edge, found)` finds at the edges, in their order. `make_add()`: one for each block of them.
 template <typename Found, typename MakeAdd>
-std::vector<Found> gather(const UnsetVector<CrossedEdge>& edges, const MakeAdd& make_add) {
+std::vector<Found> gather(const CrossedEdges& edges, const MakeAdd& make_add) {
     constexpr std::size_t kBlock = 16384;
     return find_in_blocks<Found>(edges.size(), kBlock,
                                  [&](std::size_t begin, std::size_t end, std::vector<Found>& found) {
@@ -356,7 +357,7 @@ std::vector<Found> gather(const UnsetVector<CrossedEdge>& edges, const MakeAdd& 
 }  // namespace
 
 std::vector<Eigen::Vector3i> LevelSet::upright_crossings() const {
-    return gather<Eigen::Vector3i>(impl_->crossed.edges, [] {
+    return gather<Eigen::Vector3i>(impl_->crossed, [] {
         return [](const CrossedEdge& edge, std::vector<Eigen::Vector3i>& found) {
             if (edge.axis == 2) found.emplace_back(edge.from.x(), edge.from.y(), edge.from.z());
         };
@@ -365,7 +366,7 @@ std::vector<Eigen::Vector3i> LevelSet::upright_crossings() const {
 std::optional<long> LevelSet::lattice_euler() const {
     // A vertex for each part of a cell, a quadrangle for each crossed edge, and two edges for every
     // quadrangle.
-    return impl_->crossed.cell_parts - static_cast<long>(impl_->crossed.edges.size());
+    return impl_->crossed.cell_parts() - static_cast<long>(impl_->crossed.size());
 }
 std::optional<std::size_t> LevelSet::lattice_component_count() const {
     return count_components(impl_->grid->constTree());
@@ -422,7 +423,7 @@ TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reac
 }
 
 std::vector<Surface::Diagonal> LevelSet::diagonals() const {
-    return gather<Diagonal>(impl_->crossed.edges, [this] {
+    return gather<Diagonal>(impl_->crossed, [this] {
         return [this, nodes = NodeValues(impl_->grid->constTree(), &impl_->leaves)](
                    const CrossedEdge& edge, std::vector<Diagonal>& found) mutable {
             for (int other = edge.axis + 1; other < 3; ++other)
@@ -433,7 +434,7 @@ std::vector<Surface::Diagonal> LevelSet::diagonals() const {
     });
 }
 bool LevelSet::empty() const {
-    return impl_->crossed.edges.empty();
+    return impl_->crossed.empty();
 }
 std::size_t LevelSet::active_voxels() const {
     return impl_->active_voxels;
@@ -442,7 +443,7 @@ double LevelSet::value_scale() const {
     return impl_->scale;
 }
 std::size_t LevelSet::crossing_count() const {
-    return impl_->crossed.edges.size();
+    return impl_->crossed.size();
 }
 std::size_t LevelSet::border_crossings() const {
     return impl_->border_crossings;
