@@ -30,12 +30,12 @@ constexpr double kThin = 2.0;     // sheets no farther apart
 constexpr double kApart = 1.5;    // places that near are one
 constexpr double kCovered = 2.0;  // so far apart they leave nothing out
 constexpr double kAround = 2.5;   // the middles of other patches for what fails
-constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, 3.5, 4.7, 6.0, 8.0};
+constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, kSmall, 4.7, 6.0, 8.0}, kMostReach = 8.0;
 // How far around places the lattice is made, for patches there with the largest reach, or to look at them.
 constexpr double kTriedReach = 24.0, kLookReach = 4.0 * kSmall;
 constexpr double kMostArea = 50000.0,
                  kMostAreaOfPlace = 50.0;  // square: what goes, for all patches, for one
-constexpr std::size_t kMostPlaces = 300, kMostWithLattice = 1000;
+constexpr std::size_t kFewPlaces = 30, kMostPlaces = 300, kMostWithLattice = 1000;
 constexpr int kMostPatches = 1000, kMostTooFar = 50, kMostRefused = 50;  // see Effort
 constexpr std::size_t kMostTriangles = 10000000;                         // of the whole meshes they make
 constexpr double kLikelyShare = 0.8;            // of patches and area, for places that are likely
@@ -43,22 +43,25 @@ constexpr std::size_t kMostEverywhere = 20000;  // places all over a mesh
 constexpr long kMostAstray = 30;                // components and handles, to look for them there
 constexpr std::size_t kMostPairs = 100000000;   // of components
 
-/// Where the mesh may have another topology than the lattice: at faults, and at small handles of thin sheets
-/// unless there are very many.
-std::vector<Vec3> suspicious_places(const FrameMesh& mesh, const LatticeTopology& topology,
-                                    const std::vector<double>& thickness, double resolution) {
+/// Where the topology of the mesh is another than the lattice's.
+std::vector<Vec3> faulty_places(const FrameMesh& mesh, const LatticeTopology& topology, double resolution) {
     std::vector<Vec3> result = topology.faults;
     for (const auto& diagonal : topology.parted) result.push_back(0.5 * (diagonal.from + diagonal.to));
     for (std::size_t t = 0; t < topology.speck.size(); ++t)
         if (topology.speck[t]) result.push_back(mesh.vertices[mesh.carved.triangles[t][0]]);
+    return apart(result, kApart * resolution);
+}
+
+/// There, and where it may be: at small handles of thin sheets unless there are very many.
+std::vector<Vec3> suspicious_places(const FrameMesh& mesh, const std::vector<Vec3>& faulty,
+                                    const std::vector<double>& thickness, double resolution) {
     std::vector<char> at_thin;
     for (const int p : mesh.carved.particle) at_thin.push_back(p >= 0 && thickness[p] < kThin * resolution);
-    const std::vector<int> handles =
-        small_handles(mesh.vertices, mesh.carved.triangles, at_thin, kSmall * resolution);
-    const std::vector<Vec3> faults = apart(result, kApart * resolution);
-    for (const int v : handles) result.push_back(mesh.vertices[v]);
-    std::vector<Vec3> all = apart(result, kApart * resolution);
-    return all.size() > kMostPlaces ? faults : all;
+    std::vector<Vec3> all = faulty;
+    for (const int v : small_handles(mesh.vertices, mesh.carved.triangles, at_thin, kSmall * resolution))
+        all.push_back(mesh.vertices[v]);
+    all = apart(all, kApart * resolution);
+    return all.size() > kMostPlaces ? faulty : all;
 }
 
 /// The small components of mesh or lattice that the other does not have.
@@ -226,9 +229,9 @@ private:
 std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface,
                            Effort& effort) {
     const double resolution = surface.resolution();
-    std::vector<Vec3> places = suspicious_places(trials.mesh(), trials.topology(), thickness, resolution);
+    const std::vector<Vec3> faulty = faulty_places(trials.mesh(), trials.topology(), resolution);
     const auto euler = surface.lattice_euler();
-    if (!euler || (places.empty() && euler_of(trials.mesh()) == *euler)) return 0;
+    if (!euler) return 0;
     const auto count_wanted = surface.lattice_component_count();
     if (!count_wanted) return 0;
     // Components and handles that are too many or too few.
@@ -273,10 +276,11 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         }
     };
     double share = kLikelyShare;  // of the effort
-    const auto patch_near = [&](const std::vector<Vec3>& some, long worse) {
+    const auto patch_near = [&](const std::vector<Vec3>& some, long worse, double most_reach = kMostReach) {
         for (const double reach : kReaches)
-            for (const Vec3& place : some)
-                if (now > 0 && !effort.is_enough(share)) patch_at(place, reach, now + worse);
+            if (reach <= most_reach)
+                for (const Vec3& place : some)
+                    if (now > 0 && !effort.is_enough(share)) patch_at(place, reach, now + worse);
         patcher->try_again();
     };
     const auto search = [&](std::vector<Vec3> some, bool has_lattice) {
@@ -292,8 +296,16 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         patch_near(some, 0);
         patch_near(some, -1);
     };
-    const std::vector<Vec3> suspicious = places,
-                            unmatched = unmatched_components(trials.mesh(), *wanted, resolution);
+    const std::vector<Vec3> unmatched = unmatched_components(trials.mesh(), *wanted, resolution);
+    std::vector<Vec3> places = faulty;
+    places.insert(places.end(), unmatched.begin(), unmatched.end());
+    if (!places.empty() && places.size() <= kFewPlaces) {  // there most is mended, for a fifth of the time
+        make_lattice(places, kTriedReach);
+        patch_near(places, -1, kSmall);
+        if (now == 0) return count;
+    }
+    const std::vector<Vec3> suspicious = suspicious_places(trials.mesh(), faulty, thickness, resolution);
+    places = suspicious;
     places.insert(places.end(), unmatched.begin(), unmatched.end());
     bool all_have_lattice = places.size() <= kMostWithLattice;  // for patches
     if (!places.empty()) {
