@@ -300,7 +300,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     std::vector<Vec3> places = faulty;
     places.insert(places.end(), unmatched.begin(), unmatched.end());
     if (!places.empty() && places.size() <= kFewPlaces) {  // there most is mended, for a fifth of the time
-        make_lattice(places, kTriedReach);
+        make_lattice(places, kLookReach);
         patch_near(places, -1, kSmall);
         if (now == 0) return count;
     }
