@@ -171,7 +171,10 @@ public:
     }
 
     /// Patches that were tried count as new.
-    void try_again() { tried_.clear(); }
+    void try_again() {
+        tried_.clear();
+        made_.clear();
+    }
     /// What is known of the mesh, which is another now.
     void forget() {
         bins_.reset();
@@ -180,18 +183,17 @@ public:
     }
     /// Takes the patch within `reach` resolutions of a place if it is wanted by its own numbers, near enough
     /// to the surface, wanted by the numbers of the whole mesh, if it crosses nothing, and if its mesh is
-    /// taken: `try_mesh`. Returns whether; nullopt where it was wanted by all numbers and failed then.
+    /// taken: `try_mesh`. Returns whether; nullopt where it was wanted by all numbers and failed then. The
+    /// places from `place` to `end` are likely to be next with this reach.
     template <typename IsWanted, typename AreWanted, typename TryMesh>
-    std::optional<bool> patch_at(const Vec3& place, double reach, const IsWanted& is_wanted,
+    std::optional<bool> patch_at(const Vec3* place, const Vec3* end, double reach, const IsWanted& is_wanted,
                                  const AreWanted& are_wanted, const TryMesh& try_mesh) {
         const FrameMesh& mesh = trials_.mesh();
         const TriangleBins& bins = bins_of_mesh();
-        std::vector<int> gone = triangles_around(place, reach * resolution_, bins);
-        if (tried_.count(gone) > 0) return false;
+        const auto& [gone, patch] = made_at(place, end, reach);
+        if (!tried_.insert(gone).second) return false;
         ++effort_.patches;
         effort_.area += area_of(gone, mesh) / (resolution_ * resolution_);
-        const auto patch = patch_for(gone, bins, lattice_);
-        tried_.insert(std::move(gone));
         if (!patch || !is_wanted(*patch)) return false;
         const std::vector<Vec3> corners = corners_of(*patch, mesh);
         if (!trials_.may_have(corners)) {
@@ -212,6 +214,26 @@ public:
     }
 
 private:
+    struct Made {
+        std::vector<int> gone;
+        std::optional<Patch> patch;  // if there is one that was not tried
+    };
+    /// The patch at `place`, made beside those at the next ones if it is not there yet.
+    const Made& made_at(const Vec3* place, const Vec3* end, double reach) {
+        constexpr std::ptrdiff_t kAtOnce = 4;
+        for (std::size_t p = 0; made_reach_ == reach && p < made_.size(); ++p)
+            if (made_from_ + p == place) return made_[p];
+        const TriangleBins& bins = bins_of_mesh();
+        made_from_ = place;
+        made_reach_ = reach;
+        made_.assign(static_cast<std::size_t>(std::min(kAtOnce, end - place)), {});
+        tbb::parallel_for(std::size_t{0}, made_.size(), [&](std::size_t p) {
+            auto& [gone, patch] = made_[p];
+            gone = triangles_around(place[p], reach * resolution_, bins);
+            if (tried_.count(gone) == 0) patch = patch_for(gone, bins, lattice_);
+        });
+        return made_.front();
+    }
     const TriangleBins& bins_of_mesh() {
         const FrameMesh& mesh = trials_.mesh();
         if (!bins_) bins_.emplace(mesh.vertices, mesh.carved.triangles, 0.5 * resolution_);
@@ -224,6 +246,10 @@ private:
     PatchSource lattice_;
     std::optional<TriangleBins> bins_;  // of the mesh as it is
     std::set<std::vector<int>> tried_;  // triangles of it that went
+    // At the places from made_from_ on.
+    std::vector<Made> made_;
+    const Vec3* made_from_ = nullptr;
+    double made_reach_ = 0.0;
 };
 
 std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickness, const Surface& surface,
@@ -260,15 +286,15 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
             if (astray({numbers.components + more, numbers.euler + patch.euler}) <= most) return true;
         return false;
     };
-    const auto patch_at = [&](const Vec3& place, double reach, long most) {
+    const auto patch_at = [&](const Vec3* place, const Vec3* end, double reach, long most) {
         MeshNumbers then{};
         const auto taken = patcher->patch_at(
-            place, reach, [&](const Patch& patch) { return may_be_wanted(patch, most); },
+            place, end, reach, [&](const Patch& patch) { return may_be_wanted(patch, most); },
             [&](const MeshNumbers& of_other) { return astray(then = of_other) <= most; },
             [&](FrameMesh other) { return trials.try_mesh(std::move(other)); });
         if (!taken) {
             for (const Vec3& v : trials.mesh().vertices)
-                if ((v - place).norm() < reach * resolution) around.insert({v.x(), v.y(), v.z()});
+                if ((v - *place).norm() < reach * resolution) around.insert({v.x(), v.y(), v.z()});
         } else if (*taken) {
             ++count;
             numbers = then;
@@ -279,8 +305,8 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     const auto patch_near = [&](const std::vector<Vec3>& some, long worse, double most_reach = kMostReach) {
         for (const double reach : kReaches)
             if (reach <= most_reach)
-                for (const Vec3& place : some)
-                    if (now > 0 && !effort.is_enough(share)) patch_at(place, reach, now + worse);
+                for (const Vec3 *place = some.data(), *end = place + some.size(); place != end; ++place)
+                    if (now > 0 && !effort.is_enough(share)) patch_at(place, end, reach, now + worse);
         patcher->try_again();
     };
     const auto search = [&](std::vector<Vec3> some, bool has_lattice) {
@@ -364,7 +390,7 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
     const auto patch_at = [&](const Vec3& place, double reach, const auto& is_wanted,
                               const auto& are_wanted) {
         return patcher
-            .patch_at(place, reach, is_wanted, are_wanted,
+            .patch_at(&place, &place + 1, reach, is_wanted, are_wanted,
                       [&](FrameMesh other) { return trials.try_to_mend(std::move(other)); })
             .value_or(false);
     };
