@@ -16,9 +16,10 @@ namespace isotrack {
 namespace {
 
 constexpr double kFirstStep = 0.3, kLastStep = 0.02;  // of the mean edge
-constexpr int kHalvings = 2;                          // of a move that leaves the tolerance
-constexpr double kFitted = 0.01;                      // tolerances: what is that far off may be farther off
-constexpr double kLift = 0.25;                        // tolerances: so far up or down
+constexpr std::size_t kMostTried = 4;  // of the places around one, the bluntest: others seldom do
+constexpr int kHalvings = 2;           // of a move that leaves the tolerance
+constexpr double kFitted = 0.01;       // tolerances: what is that far off may be farther off
+constexpr double kLift = 0.25;         // tolerances: so far up or down
 
 /// The triangles around a vertex.
 struct Star {
@@ -186,8 +187,10 @@ std::optional<Proposal> search(const BluntedMesh& mesh, int triangle, Surface::P
                         if (const double s = star.sharpness_at(there, least); s < least)
                             blunter.emplace_back(s, there);
                     }
-            std::sort(blunter.begin(), blunter.end(),
-                      [](const auto& p, const auto& q) { return p.first < q.first; });
+            const auto tried = std::min(blunter.size(), kMostTried);
+            std::partial_sort(blunter.begin(), blunter.begin() + static_cast<std::ptrdiff_t>(tried),
+                              blunter.end(), [](const auto& p, const auto& q) { return p.first < q.first; });
+            blunter.resize(tried);
             const auto found = std::find_if(blunter.begin(), blunter.end(), [&](const auto& candidate) {
                 return may_go_to(candidate.second);
             });
