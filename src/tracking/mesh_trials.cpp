@@ -27,10 +27,6 @@ std::vector<Vec3> failing_in(const Inspection& inspection, double tolerance) {
 
 }  // namespace
 
-MeshTopology topology_of(const FrameMesh& mesh) {
-    return mesh_topology({mesh.vertices, mesh.carved.triangles, {}, {}});
-}
-
 std::vector<Vec3> MeshTrials::failing_places() const {
     return failing_in(inspection_, limits_.tolerance);
 }

@@ -1,7 +1,6 @@
 // Other meshes instead of the last one of a frame.
 #pragma once
 
-#include "isotrack/meshing/mesh_topology.h"
 #include "isotrack/sampling/sizing.h"
 #include "tracking/inspection.h"
 
@@ -51,8 +50,5 @@ private:
     const SizingLimits& limits_;
     bool is_topology_known_ = true;
 };
-
-/// Of the triangles.
-MeshTopology topology_of(const FrameMesh& mesh);
 
 }  // namespace isotrack

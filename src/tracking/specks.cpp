@@ -10,6 +10,7 @@
 #include "sampling/compact.h"
 #include "surface/far_value.h"
 #include "tracking/cell_centroid.h"
+#include "tracking/patching.h"
 
 namespace isotrack {
 namespace {
@@ -156,13 +157,13 @@ std::size_t join_specks(MeshTrials& trials, CellLabels& labels, const Carve& car
         return specks;
     };
     const auto join = [&](const std::set<int>& part) {
-        const MeshTopology now = topology_of(trials.mesh());
+        const MeshNumbers now = numbers_of(trials.mesh());
         CellLabels changed = labels;
         const auto way = way_from(part, changed, cells, particles, surface, limits.tolerance);
         if (way.empty()) return false;
         for (const int c : way) changed[c] = 1;
         FrameMesh other = carve(changed);
-        const MeshTopology then = topology_of(other);
+        const MeshNumbers then = numbers_of(other);
         if (then.components != now.components - 1 || then.euler != now.euler - 2 ||
             !trials.try_mesh(std::move(other)))
             return false;

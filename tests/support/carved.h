@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isotrack/meshing/convection.h"
+#include "isotrack/meshing/mesh_topology.h"
 #include "support/samples.h"
 #include "tracking/inspection.h"
 #include "tracking/mesh_trials.h"
@@ -57,6 +58,11 @@ struct Carved : Samples {
         return isotrack::relabel(labels, cells, now, inspect(now), particles, surface, limits);
     }
 };
+
+/// Of the triangles.
+inline MeshTopology topology_of(const FrameMesh& mesh) {
+    return mesh_topology({mesh.vertices, mesh.carved.triangles, {}, {}});
+}
 
 /// A mesh, its inspection with all that there is to look at, and trials of others.
 struct Inspected {

@@ -23,6 +23,7 @@ namespace {
 using support::Carved;
 using support::Inspected;
 using support::lattice_grid;
+using support::topology_of;
 
 /// A disk of one layer of lattice nodes, which are inside by little: about a third of a voxel thick. Beside
 /// it a ball, so that the values inside are known for distances.

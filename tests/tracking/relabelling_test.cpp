@@ -15,6 +15,7 @@ namespace {
 
 using support::Carved;
 using support::kResolution;
+using support::topology_of;
 
 TEST(Relabelling, GivesACellOnTheWrongSideBack) {
     const auto solid = shapes::ellipsoid({0, 0, 0}, {1.0, 0.8, 0.6}, kResolution);

@@ -21,6 +21,7 @@ namespace {
 using support::Carved;
 using support::Inspected;
 using support::lattice_grid;
+using support::topology_of;
 
 double to_ball(const Vec3& p) {
     return (p - Vec3(0.2, 0.1, 0.3)).norm() - 5.3;
