@@ -118,7 +118,7 @@ std::size_t count_edges_of(const Leaf& leaf, const LeafSides& sides, TreeReader&
     return result;
 }
 
-/// Calls `visit` with each, as many as are counted.
+/// Calls `visit` with each, as many as `count_edges_of` counts.
 template <typename Visit>
 void for_each_edge_of(const Leaf& leaf, const LeafSides& sides, TreeReader& reader, const Visit& visit) {
     const float* own = leaf.buffer().data();

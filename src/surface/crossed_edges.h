@@ -41,6 +41,7 @@ public:
 
     std::size_t size() const { return packed_.size(); }
     bool empty() const { return packed_.empty(); }
+    /// In a few steps; `for_each_of` takes none.
     CrossedEdge operator[](std::size_t i) const {
         std::size_t part = part_at_[i / kStep];
         while (parts_[part].end <= i) ++part;
@@ -63,7 +64,7 @@ private:
     /// Its lower end is a node of the leaf or one step below it.
     struct Packed {
         float fraction;
-        std::uint32_t x : 4, y : 4, z : 4;  // of the lower end in the leaf, and 1
+        std::uint32_t x : 4, y : 4, z : 4;  // of the lower end, counted from one step below the leaf
         std::uint32_t axis : 2, outward : 1, at_border : 1, saddles : 3;
 
         Packed(const CrossedEdge& edge, const openvdb::Coord& origin)
@@ -85,10 +86,11 @@ private:
                     static_cast<std::uint8_t>(saddles)};
         }
     };
+    static_assert(sizeof(Packed) == 8);
     static constexpr std::size_t kStep = 64;
 
     UnsetVector<Packed> packed_;
-    std::vector<Part> parts_;             // one after the other
+    std::vector<Part> parts_;             // one after the other, none empty
     std::vector<std::uint32_t> part_at_;  // of every kStep-th edge
     bool finite_ = true;
     long cell_parts_ = 0;

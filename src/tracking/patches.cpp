@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <map>
 #include <memory>
@@ -25,13 +26,14 @@ namespace isotrack {
 namespace {
 
 // All in resolutions.
+constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr double kSmall = 3.5;    // reach of the pieces of the mesh that are looked at
 constexpr double kThin = 2.0;     // sheets no farther apart
 constexpr double kApart = 1.5;    // places that near are one
 constexpr double kCovered = 2.0;  // so far apart they leave nothing out
 constexpr double kAround = 2.5;   // the middles of other patches for what fails
-constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, kSmall, 4.7, 6.0, 8.0}, kMostReach = 8.0;
-// How far around places the lattice is made, for patches there with the largest reach, or to look at them.
+constexpr double kReaches[] = {1.0, 1.5, 2.0, 2.7, kSmall, 4.7, 6.0, 8.0};
+// How far around places the lattice is made, for patches there with the largest reach, or with `kSmall`.
 constexpr double kTriedReach = 24.0, kLookReach = 4.0 * kSmall;
 constexpr double kMostArea = 50000.0,
                  kMostAreaOfPlace = 50.0;  // square: what goes, for all patches, for one
@@ -184,7 +186,8 @@ public:
     /// Takes the patch within `reach` resolutions of a place if it is wanted by its own numbers, near enough
     /// to the surface, wanted by the numbers of the whole mesh, if it crosses nothing, and if its mesh is
     /// taken: `try_mesh`. Returns whether; nullopt where it was wanted by all numbers and failed then. The
-    /// places from `place` to `end` are likely to be next with this reach.
+    /// places from `place` to `end` are likely to be next with this reach: until `try_again` they must not
+    /// change or move.
     template <typename IsWanted, typename AreWanted, typename TryMesh>
     std::optional<bool> patch_at(const Vec3* place, const Vec3* end, double reach, const IsWanted& is_wanted,
                                  const AreWanted& are_wanted, const TryMesh& try_mesh) {
@@ -302,7 +305,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         }
     };
     double share = kLikelyShare;  // of the effort
-    const auto patch_near = [&](const std::vector<Vec3>& some, long worse, double most_reach = kMostReach) {
+    const auto patch_near = [&](const std::vector<Vec3>& some, long worse, double most_reach = kFar) {
         for (const double reach : kReaches)
             if (reach <= most_reach)
                 for (const Vec3 *place = some.data(), *end = place + some.size(); place != end; ++place)
@@ -328,8 +331,9 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     if (!places.empty() && places.size() <= kFewPlaces) {  // there most is mended, for a fifth of the time
         make_lattice(places, kLookReach);
         patch_near(places, -1, kSmall);
-        if (now == 0) return count;
+        if (now == 0 || effort.is_enough()) return count;
     }
+    // Some may be mended by now.
     const std::vector<Vec3> suspicious = suspicious_places(trials.mesh(), faulty, thickness, resolution);
     places = suspicious;
     places.insert(places.end(), unmatched.begin(), unmatched.end());

@@ -157,13 +157,12 @@ std::size_t join_specks(MeshTrials& trials, CellLabels& labels, const Carve& car
         return specks;
     };
     const auto join = [&](const std::set<int>& part) {
-        const MeshNumbers now = numbers_of(trials.mesh());
         CellLabels changed = labels;
         const auto way = way_from(part, changed, cells, particles, surface, limits.tolerance);
         if (way.empty()) return false;
         for (const int c : way) changed[c] = 1;
         FrameMesh other = carve(changed);
-        const MeshNumbers then = numbers_of(other);
+        const MeshNumbers now = numbers_of(trials.mesh()), then = numbers_of(other);
         if (then.components != now.components - 1 || then.euler != now.euler - 2 ||
             !trials.try_mesh(std::move(other)))
             return false;

@@ -107,7 +107,7 @@ double memory_mb(const std::string& name) {
     return 0.0;
 }
 
-/// What reading has freed would count as the grid's, and be free for all that comes.
+/// What reading has freed would count as the grid's, though tracking takes it.
 void give_back_free_memory() {
 #ifdef __GLIBC__
     malloc_trim(0);
@@ -160,7 +160,8 @@ int track(const TrackArguments& arguments) {
             grid = read_grid(path, choose_grid(list_grids(path), {}, path));
         });
         const double open = seconds_of([&] { level_set = std::make_unique<LevelSet>(grid); });
-        if (i == 0) {
+        if (i ==
+            0) {  // alone: tracking would wait for its memory again. What is freed later counts as its own.
             give_back_free_memory();
             grid_mb = memory_mb("VmRSS") - memory_mb("RssFile");
         }

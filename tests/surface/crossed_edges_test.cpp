@@ -5,6 +5,7 @@
 #include <openvdb/openvdb.h>
 
 #include <array>
+#include <limits>
 #include <random>
 #include <set>
 
@@ -50,8 +51,40 @@ TEST(CrossedEdges, AreThoseOfDropsInLeavesOfTheirOwn) {
             EXPECT_EQ(edge.from, found[i].from);
             EXPECT_EQ(edge.axis, found[i].axis);
             EXPECT_EQ(edge.fraction, found[i].fraction);
+            EXPECT_EQ(edge.outward, found[i].outward);
+            EXPECT_EQ(edge.at_border, found[i].at_border);
+            EXPECT_EQ(edge.saddles, found[i].saddles);
+            EXPECT_TRUE(edge.saddles == 7 || (edge.from & ~7) == part.origin) << "in a tile";
         });
     EXPECT_EQ(visited, found.size());
+}
+
+TEST(CrossedEdges, KnowTheirBorderAndTheirSaddles) {
+    openvdb::FloatTree tree(1.0f);
+    for (int x = -2; x <= 3; ++x)
+        for (int y = -2; y <= 3; ++y)
+            for (int z = -2; z <= 2; ++z) tree.setValue({x, y, z}, 0.5f);
+    tree.setValue({0, 0, 0}, -0.5f);  // two across the diagonal of a face
+    tree.setValue({1, 1, 0}, -0.5f);
+    const CrossedEdges found = find_crossed_edges(tree);
+    ASSERT_EQ(found.size(), 12u);
+    EXPECT_EQ(found.at_border(), 0u);
+    const std::set<std::array<int, 4>> of_saddle{{0, 0, 0, 0}};  // the lowest edge of the face names it
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        const CrossedEdge edge = found[i];
+        const bool lowest = of_saddle.count({edge.from.x(), edge.from.y(), edge.from.z(), edge.axis}) > 0;
+        EXPECT_EQ(edge.saddles, lowest ? 1 << 1 : 0) << edge.from << " " << static_cast<int>(edge.axis);
+    }
+}
+
+TEST(CrossedEdges, AreNoneOfNothingAndOfWhatIsNotFinite) {
+    openvdb::FloatTree tree(1.0f);
+    EXPECT_TRUE(find_crossed_edges(tree).empty());
+    EXPECT_TRUE(find_crossed_edges(tree).finite());
+    tree.setValue({1, 2, 3}, -0.5f);
+    tree.setValue({1, 2, 4}, std::numeric_limits<float>::quiet_NaN());
+    EXPECT_TRUE(find_crossed_edges(tree).empty());
+    EXPECT_FALSE(find_crossed_edges(tree).finite());
 }
 
 }  // namespace
