@@ -326,23 +326,23 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         patch_near(some, -1);
     };
     const std::vector<Vec3> unmatched = unmatched_components(trials.mesh(), *wanted, resolution);
-    std::vector<Vec3> places = faulty;
-    places.insert(places.end(), unmatched.begin(), unmatched.end());
-    if (!places.empty() && places.size() <= kFewPlaces) {  // there most is mended, for a fifth of the time
+    const auto and_unmatched = [&](std::vector<Vec3> some) {
+        some.insert(some.end(), unmatched.begin(), unmatched.end());
+        return some;
+    };
+    std::vector<Vec3> places = and_unmatched(faulty);
+    if (!places.empty() && places.size() <= kFewPlaces) {  // often that is enough
         make_lattice(places, kLookReach);
         patch_near(places, -1, kSmall);
         if (now == 0 || effort.is_enough()) return count;
     }
     // Some may be mended by now.
     const std::vector<Vec3> suspicious = suspicious_places(trials.mesh(), faulty, thickness, resolution);
-    places = suspicious;
-    places.insert(places.end(), unmatched.begin(), unmatched.end());
+    places = and_unmatched(suspicious);
     bool all_have_lattice = places.size() <= kMostWithLattice;  // for patches
     if (!places.empty()) {
         make_lattice(places, all_have_lattice ? kTriedReach : kLookReach);
-        std::vector<Vec3> likely = patcher->unlike(suspicious, places.size() <= kMostPlaces);
-        likely.insert(likely.end(), unmatched.begin(), unmatched.end());
-        search(std::move(likely), all_have_lattice);
+        search(and_unmatched(patcher->unlike(suspicious, places.size() <= kMostPlaces)), all_have_lattice);
     }
     share = 1.0;
     if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true)) {
