@@ -16,8 +16,8 @@ namespace isotrack {
 namespace {
 
 constexpr double kFirstStep = 0.3, kLastStep = 0.02;  // of the mean edge
-constexpr std::size_t kMostTried =
-    4;  // of the places around one, the bluntest: where none of them may be, others seldom may
+// Of the places around one, the bluntest: where none of them may be, others seldom may.
+constexpr std::size_t kMostTried = 12;
 constexpr int kHalvings = 2;      // of a move that leaves the tolerance
 constexpr double kFitted = 0.01;  // tolerances: what is that far off may be farther off
 constexpr double kLift = 0.25;    // tolerances: so far up or down
