@@ -6,9 +6,11 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 #include <utility>
 
 #include "find_in_blocks.h"
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
@@ -45,22 +47,24 @@ double whole_below(double x) {
 class LatticeEdges {
 public:
     explicit LatticeEdges(const Eigen::Affine3d& lattice) : to_lattice_(lattice.inverse()) {
-        for (int axis = 0; axis < 3; ++axis) along_[axis] = lattice.linear().col(axis).normalized();
+        for (int axis = 0; axis < 3; ++axis)
+            along_[axis] = lattice.linear().col(axis).normalized().cast<float>();
     }
+    const Eigen::Vector3f (&along() const)[3] { return along_; }  ///< Unit.
     struct Edge {
         Vec3 low;  // its lower end
         int axis;
         bool upward;  // goes out there
     };
     Edge edge_of(const Surface::Crossing& crossing) const {
-        const Vec3 outward = crossing.outward.cast<double>();
+        const Eigen::Vector3f& outward = crossing.outward;
         int axis = 0;
         for (int other = 1; other < 3; ++other)
             if (std::abs(along_[other].dot(outward)) > std::abs(along_[axis].dot(outward))) axis = other;
         const Vec3 p = to_lattice_ * crossing.point;
         Vec3 low;
         for (int k = 0; k < 3; ++k) low[k] = whole_below(p[k] + 0.5);
-        const bool upward = along_[axis].dot(outward) > 0.0;
+        const bool upward = along_[axis].dot(outward) > 0.0f;
         // At a node, which is outside as all are where the value is 0, the edge is the one that goes out to
         // it.
         const bool at_node = std::abs(p[axis] - low[axis]) < kAtNode;
@@ -70,101 +74,93 @@ public:
 
 private:
     const Eigen::Affine3d to_lattice_;
-    Vec3 along_[3];
+    Eigen::Vector3f along_[3];
 };
 
-/// The crossings of a cell. Its corner k is bit 0 of k along the first axis, bit 1 along the second, bit 2
-/// along the third.
+/// For each corner of a cell a number: the same for those on one side that edges join.
+using Parts = std::array<std::uint8_t, 8>;
+
+/// Joins all that have the number of either corner.
+void join(Parts& parts, int k, int l) {
+    const std::uint8_t low = std::min(parts[k], parts[l]), high = std::max(parts[k], parts[l]);
+    std::replace(parts.begin(), parts.end(), high, low);
+}
+
+/// By the corners that are inside: bit k for corner k.
+const std::array<Parts, 256> kParts = [] {
+    std::array<Parts, 256> result{};
+    for (unsigned inside = 0; inside < 256; ++inside) {
+        std::iota(result[inside].begin(), result[inside].end(), std::uint8_t{0});
+        for (int k = 0; k < 8; ++k)
+            for (const int step : {1, 2, 4})
+                if ((k & step) == 0 && (inside >> k & 1) == (inside >> (k | step) & 1))
+                    join(result[inside], k, k | step);
+    }
+    return result;
+}();
+
+/// A cell by the values at its corners.
 class Cell {
 public:
-    void clear() {
-        count_ = 0;
-        crossed_.fill(-1);
-        joins_ = 0;
+    explicit Cell(const Surface::Probe::CellValues& values) : values_(values) {
+        for (int k = 0; k < 8; ++k) inside_ |= static_cast<unsigned>(values[k] < 0.0) << k;
+        parts_ = kParts[inside_];
     }
-    void add(int low_corner, int axis, bool upward, const Surface::Crossing& crossing) {
-        int& at = crossed_[3 * low_corner + axis];
-        if (at >= 0) return;
-        at = count_;
-        const int high_corner = low_corner | 1 << axis;
-        crossings_[count_++] = {crossing.point, crossing.outward, upward ? low_corner : high_corner,
-                                upward ? high_corner : low_corner};
-    }
+    void join_corners(int k, int l) { join(parts_, k, l); }
 
-    /// More than one for each face come from cells too far out to be told apart.
-    void join(const int* corners) {
-        if (joins_ < static_cast<int>(joined_.size())) joined_[joins_++] = {corners[0], corners[1]};
-    }
-
-    /// Crossings are of one part of the surface when the corners inside at them are joined, and those
-    /// outside, too.
-    void add_means(std::vector<Surface::Crossing>& means) const {
-        const std::array<int, 8> part = joined_corners();
-        std::array<bool, 12> done{};
-        for (int i = 0; i < count_; ++i) {
-            if (done[i]) continue;
-            Vec3 sum = Vec3::Zero();
+    /// Calls `visit(place, way)` for each part of the surface: the mean of its crossings, in edges from the
+    /// lowest corner on, and the middle between the directions they go. They are of one part when the corners
+    /// inside at them are joined, and those outside, too. `along`: unit directions of the axes.
+    template <typename Visit>
+    void for_each_mean(const Eigen::Vector3f (&along)[3], const Visit& visit) const {
+        struct Group {
+            int ends = -1;  // numbers of the corners inside and outside
             int members = 0;
-            std::array<Eigen::Vector3f, 6> ways;  // always summed in the same order: they stay few
-            ways.fill(Eigen::Vector3f::Zero());
-            for (int j = i; j < count_; ++j) {
-                const auto& [point, outward, inside, outside] = crossings_[j];
-                if (part[inside] != part[crossings_[i].inside] ||
-                    part[outside] != part[crossings_[i].outside])
-                    continue;
-                done[j] = true;
-                sum += point;
-                ++members;
-                ways[(inside ^ outside) / 2 + (inside < outside ? 3 : 0)] = outward;
+            Vec3 sum = Vec3::Zero();
+            unsigned ways = 0;  // bit axis, + 3 for those that go down
+        };
+        std::array<Group, 12> groups;
+        int count = 0;
+        for (int axis = 0; axis < 3; ++axis)
+            for (int k = 0; k < 8; ++k) {
+                const int l = k | 1 << axis;
+                const bool goes_up = (inside_ >> k & 1) != 0;
+                if (l == k || goes_up == ((inside_ >> l & 1) != 0)) continue;
+                const int ends = goes_up ? 8 * parts_[k] + parts_[l] : 8 * parts_[l] + parts_[k];
+                int g = 0;
+                while (g < count && groups[g].ends != ends) ++g;
+                if (g == count) groups[count++].ends = ends;
+                Group& group = groups[g];
+                ++group.members;
+                group.sum += Vec3(k & 1, k >> 1 & 1, k >> 2);
+                group.sum[axis] += values_[k] / (values_[k] - values_[l]);
+                group.ways |= 1u << (goes_up ? axis : axis + 3);
             }
-            Eigen::Vector3f way = Eigen::Vector3f::Zero();
-            for (const Eigen::Vector3f& w : ways) way += w;
-            const bool any = way.squaredNorm() > kLeastWay * kLeastWay;
-            means.push_back({sum / members, any ? way.normalized() : crossings_[i].outward});
+        for (int g = 0; g < count; ++g) {
+            const Group& group = groups[g];
+            Eigen::Vector3f way = Eigen::Vector3f::Zero(), any = way;
+            for (int w = 0; w < 6; ++w) {
+                if ((group.ways >> w & 1u) == 0) continue;
+                any = w < 3 ? along[w] : -along[w - 3];
+                way += any;
+            }
+            const bool cancels_out = !(way.squaredNorm() > kLeastWay * kLeastWay);
+            visit(group.sum / group.members, cancels_out ? any : way.normalized());
         }
     }
 
 private:
-    /// A number for each corner: the same for those that edges without a crossing join, or a diagonal.
-    std::array<int, 8> joined_corners() const {
-        std::array<int, 8> part{0, 1, 2, 3, 4, 5, 6, 7};
-        for (bool again = true; again;) {
-            again = false;
-            for (int k = 0; k < 8; ++k)
-                for (int axis = 0; axis < 3; ++axis) {
-                    const int l = k | 1 << axis;
-                    if (l == k || crossed_[3 * k + axis] >= 0 || part[k] == part[l]) continue;
-                    part[k] = part[l] = std::min(part[k], part[l]);
-                    again = true;
-                }
-            for (int j = 0; j < joins_; ++j) {
-                const auto [k, l] = joined_[j];
-                if (part[k] == part[l]) continue;
-                part[k] = part[l] = std::min(part[k], part[l]);
-                again = true;
-            }
-        }
-        return part;
-    }
-
-    struct Crossing {
-        Vec3 point;
-        Eigen::Vector3f outward;
-        int inside, outside;  // corners
-    };
-    std::array<Crossing, 12> crossings_;
-    std::array<int, 24> crossed_;  // by lower corner and axis: which crossing, or -1
-    int count_ = 0;
-    std::array<std::array<int, 2>, 6> joined_;  // corners, across diagonals
-    int joins_ = 0;
+    const Surface::Probe::CellValues& values_;
+    unsigned inside_ = 0;  // bit k for corner k
+    Parts parts_;
 };
 
 }  // namespace
 
-CellPoints::CellPoints(const CrossingGrid& crossings, const Eigen::Affine3d& lattice,
+CellPoints::CellPoints(const Surface& surface, const CrossingGrid& crossings,
                        const std::vector<Surface::Diagonal>& diagonals)
-    : crossings_(crossings), lattice_(lattice) {
-    const Eigen::Affine3d to_lattice = lattice.inverse();
+    : surface_(surface), crossings_(crossings), lattice_(surface.lattice()) {
+    const Eigen::Affine3d to_lattice = lattice_.inverse();
     for (const Surface::Diagonal& d : diagonals) {
         const Vec3 nodes[2] = {(to_lattice * d.from).array().round(), (to_lattice * d.to).array().round()};
         int across = 0;
@@ -211,36 +207,31 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
                         std::back_inserter(fresh));
     wanted = std::vector<std::uint64_t>();  // there are many
 
-    constexpr double kRounding = 0.01;
-    const Vec3 half = 0.5 * (1.0 + kRounding) * lattice_.linear().cwiseAbs().rowwise().sum();
     // Nearly all cells have one part, which has a place from the start: there are many.
     std::vector<Surface::Crossing> result;
     result.reserve(fresh.size() + fresh.size() / 16);
     result.resize(fresh.size());
+    ThreadProbes probes(surface_);
     const auto others = find_in_blocks<Surface::Crossing>(
         fresh.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<Surface::Crossing>& found) {
-            Cell cell;
-            std::vector<Surface::Crossing> means;
+            Surface::Probe& probe = probes.local();
             for (std::size_t i = begin; i < end; ++i) {
-                const Vec3 origin = unpacked(fresh[i]), middle = lattice_ * (origin.array() + 0.5).matrix();
-                cell.clear();
-                crossings_.for_each_in(Box(middle - half, middle + half), [&](std::size_t c) {
-                    const Surface::Crossing crossing = crossings_[c];
-                    const auto [low, axis, upward] = edges.edge_of(crossing);
-                    const Vec3 from = low - origin;
-                    if (from[axis] != 0.0 || from.minCoeff() < 0.0 || from.maxCoeff() > 1.0) return;
-                    const int corner = static_cast<int>(from.x() + 2.0 * from.y() + 4.0 * from.z());
-                    cell.add(corner, axis, upward, crossing);
-                });
+                const Vec3 low = unpacked(fresh[i]);
+                const Surface::Probe::CellValues values = probe.cell_values(low, lattice_);
+                Cell cell(values);
                 auto join = std::lower_bound(joins_.begin(), joins_.end(), fresh[i],
                                              [](const Join& j, std::uint64_t c) { return j.cell < c; });
-                for (; join != joins_.end() && join->cell == fresh[i]; ++join) cell.join(join->corners);
-                means.clear();
-                cell.add_means(means);
+                for (; join != joins_.end() && join->cell == fresh[i]; ++join)
+                    cell.join_corners(join->corners[0], join->corners[1]);
                 result[i].stands_for = 0;  // none
-                if (means.empty()) continue;
-                result[i] = means.front();
-                found.insert(found.end(), means.begin() + 1, means.end());
+                bool first = true;
+                cell.for_each_mean(edges.along(), [&](const Vec3& place, const Eigen::Vector3f& way) {
+                    const Surface::Crossing mean{lattice_ * (low + place), way};
+                    if (std::exchange(first, false))
+                        result[i] = mean;
+                    else
+                        found.push_back(mean);
+                });
             }
         });
     result.erase(

@@ -1,4 +1,4 @@
-// Where a surface passes through the cells of its lattice, as its crossings have it.
+// Where a surface passes through the cells of its lattice.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@ namespace isotrack {
 
 class CellPoints {
 public:
-    /// `crossings`: all of `lattice`, none that stands for others. They must outlive it. `diagonals`: all of
-    /// the surface.
-    CellPoints(const CrossingGrid& crossings, const Eigen::Affine3d& lattice,
+    /// `crossings`: of `surface`, none that stands for others. Both must outlive it. `diagonals`: all of the
+    /// surface.
+    CellPoints(const Surface& surface, const CrossingGrid& crossings,
                const std::vector<Surface::Diagonal>& diagonals);
 
     /// In the cells around the edges that some crossings are on, and in all with an ambiguous face: for each
@@ -28,6 +28,7 @@ private:
         int corners[2];
     };
 
+    const Surface& surface_;
     const CrossingGrid& crossings_;
     const Eigen::Affine3d lattice_;
     std::vector<Join> joins_;           // by cell

@@ -27,6 +27,14 @@ Surface::Sample GridProbe::sample(const Vec3& p) {
     return s;
 }
 
+Surface::Probe::CellValues GridProbe::cell_values(const Vec3& low, const Eigen::Affine3d& /*lattice*/) {
+    CellValues result;
+    float v[2][2][2];
+    stencil_.corners(low, v);
+    for (int k = 0; k < 8; ++k) result[k] = v[k & 1][k >> 1 & 1][k >> 2];
+    return result;
+}
+
 /// Beyond the band values are all alike. There the distance is that to a point in the band and its value,
 /// no less than the true one; least where that point lies on the shortest way, which its gradient
 /// tells. Where the band is not near it is as far as distances are known.

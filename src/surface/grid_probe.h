@@ -18,6 +18,7 @@ public:
     double value(const Vec3& p) override { return stencil_.value(map_.to_index(p)).joined; }
     double farther_value(const Vec3& p) override;
     Surface::Sample sample(const Vec3& p) override;
+    CellValues cell_values(const Vec3& low, const Eigen::Affine3d& lattice) override;
 
     /// How far from the surface `farther_value` is right in size.
     static double reach(double band) { return (kInBand + kBeyondBand) * band; }

@@ -34,6 +34,12 @@ public:
         return {joined, is_farther(trilinear, joined) ? trilinear : joined};
     }
 
+    /// The values at a cell's corners.
+    void corners(const Vec3& low, float (&v)[2][2][2]) {
+        Vec3 t;
+        nodes_.block(split(low, t), v);
+    }
+
     /// Trilinear value, and the trilinear interpolation of the central differences at the corners, per voxel.
     Surface::Sample sample(const Vec3& index) {
         Vec3 t;

@@ -23,6 +23,12 @@ Eigen::Array3i nodes_across(const Box& box, double h) {
 
 }  // namespace
 
+Surface::Probe::CellValues Surface::Probe::cell_values(const Vec3& low, const Eigen::Affine3d& lattice) {
+    CellValues result;
+    for (int k = 0; k < 8; ++k) result[k] = value(lattice * (low + Vec3(k & 1, k >> 1 & 1, k >> 2)));
+    return result;
+}
+
 std::optional<Vec3> Surface::Probe::project(const Vec3& start) {
     // f, p and lambda as in the paper's algorithm 4.
     Vec3 p = start;

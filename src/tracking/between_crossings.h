@@ -19,7 +19,7 @@ public:
         : surface_(surface),
           crossings_(crossings),
           tolerance_(tolerance),
-          cells_(crossings, surface.lattice(), diagonals) {}
+          cells_(surface, crossings, diagonals) {}
 
     /// Points of the surface beside crossings that the mesh only just reaches: at its folds, the sharper the
     /// sooner, those with up to half a spacing of the crossings to spare, since from a fold what lies between

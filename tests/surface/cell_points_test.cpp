@@ -42,7 +42,7 @@ TEST_P(Solids, HaveThemWhereTheDualMeshHasItsVertices) {
     std::vector<openvdb::Vec3s> vertices;
     std::vector<openvdb::Vec4I> quads;
     openvdb::tools::volumeToMesh(*surface->grid(), vertices, quads);
-    const auto points = CellPoints(*crossings, surface->lattice(), surface->diagonals()).around(all);
+    const auto points = CellPoints(*surface, *crossings, surface->diagonals()).around(all);
     const CrossingGrid grid(points, kVoxel);
     const auto has_node_just_inside = [&](const Vec3& vertex) {
         const Vec3 low = (surface->lattice().inverse() * vertex).array().floor();
@@ -91,7 +91,7 @@ TEST(CellPoints, AreTheVerticesOfVolumeToMeshAtAmbiguousFaces) {
     const CrossingGrid crossings(surface);
     std::vector<int> all(crossings.size());
     std::iota(all.begin(), all.end(), 0);
-    const auto points = CellPoints(crossings, surface.lattice(), surface.diagonals()).around(all);
+    const auto points = CellPoints(surface, crossings, surface.diagonals()).around(all);
     EXPECT_EQ(points.size(), vertices.size());
     const CrossingGrid found(points, 1.0);
     for (const openvdb::Vec3s& v : vertices) {
@@ -103,14 +103,13 @@ TEST(CellPoints, AreTheVerticesOfVolumeToMeshAtAmbiguousFaces) {
 }
 
 TEST_P(Solids, HaveEachOfThemOnce) {
-    CellPoints cells(*crossings, surface->lattice(), surface->diagonals());
+    CellPoints cells(*surface, *crossings, surface->diagonals());
     const std::vector<int> some(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 3));
     const std::size_t at_first = cells.around(some).size(), then = cells.around(all).size();
     EXPECT_GT(at_first, some.size() / 3);
     EXPECT_GT(then, 0u);
     EXPECT_TRUE(cells.around(all).empty());
-    EXPECT_EQ(at_first + then,
-              CellPoints(*crossings, surface->lattice(), surface->diagonals()).around(all).size());
+    EXPECT_EQ(at_first + then, CellPoints(*surface, *crossings, surface->diagonals()).around(all).size());
 }
 
 INSTANTIATE_TEST_SUITE_P(Places, Solids, ::testing::Values(0.0, 0.0221, 0.0137));

@@ -183,6 +183,32 @@ TEST(LevelSet, HasTheGradientOfCentralDifferencesAtNodes) {
     }
 }
 
+/// The corners of cells anywhere, in the band and in tiles, against the grid's own values.
+TEST(LevelSet, HasTheValuesOfItsNodesAtTheCornersOfCells) {
+    const auto transform = uniform(0.05);
+    transform->postRotate(0.4, openvdb::math::Y_AXIS);
+    transform->postTranslate({0.3, -2.0, 0.1});
+    const auto grid = sphere_grid<openvdb::FloatGrid>(transform, 0.15);
+    const LevelSet level_set(grid);
+    const auto probe = level_set.probe();
+    const auto accessor = level_set.grid()->getConstAccessor();
+    std::mt19937 random(6);
+    std::uniform_int_distribution<int> coordinate(-30, 30);
+    const openvdb::Coord middle = openvdb::Coord::round(transform->worldToIndex({0.0, 0.0, 0.0}));
+    int crossed = 0;
+    for (int i = 0; i < 5000; ++i) {
+        const openvdb::Coord low =
+            middle + openvdb::Coord(coordinate(random), coordinate(random), coordinate(random));
+        const auto values = probe->cell_values(Vec3(low.x(), low.y(), low.z()), level_set.lattice());
+        for (int k = 0; k < 8; ++k)
+            ASSERT_EQ(values[k], accessor.getValue(low.offsetBy(k & 1, k >> 1 & 1, k >> 2)))
+                << low << ' ' << k;
+        const auto [least, most] = std::minmax_element(values.begin(), values.end());
+        crossed += *least < 0.0 && *most >= 0.0;
+    }
+    EXPECT_GT(crossed, 50);
+}
+
 TEST(LevelSet, UnderstandsTranslation) {
     auto transform = uniform(0.08);
     transform->postTranslate({0.013, -7.3, 0.04});

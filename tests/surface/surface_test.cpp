@@ -73,6 +73,20 @@ std::vector<Vec3> places_near(const Surface& surface, double distance, std::size
     return places;
 }
 
+TEST(Surface, HasItsOwnValuesAtTheCornersOfCells) {
+    for (const SurfacePtr& surface : some_shapes()) {
+        const auto probe = Plain(surface).probe();
+        const Eigen::Affine3d lattice = Plain(surface).lattice();
+        const auto formula = surface->probe();
+        for (const Vec3& place : places_near(*surface, 0.2, 100)) {
+            const Vec3 low = (lattice.inverse() * place).array().floor();
+            const auto values = probe->cell_values(low, lattice);
+            for (int k = 0; k < 8; ++k)
+                EXPECT_EQ(values[k], formula->value(lattice * (low + Vec3(k % 2, k / 2 % 2, k / 4))));
+        }
+    }
+}
+
 TEST(Projection, LandsOnTheSurfaceNextToWhereItStarted) {
     for (const SurfacePtr& shape : some_shapes()) {
         const auto truth = shape->probe(), probe = Plain(shape).probe();

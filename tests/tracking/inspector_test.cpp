@@ -30,7 +30,7 @@ TEST(Inspector, FindsWhatIsMissedBetweenCrossingsThatAreReached) {
     const CrossingGrid crossings(*box);
     std::vector<int> all(crossings.size());
     std::iota(all.begin(), all.end(), 0);
-    const CrossingGrid cells(CellPoints(crossings, box->lattice(), box->diagonals()).around(all),
+    const CrossingGrid cells(CellPoints(*box, crossings, box->diagonals()).around(all),
                              kResolution);
     Carved carved(*box, 1.0);
     const FrameMesh mesh = carved.mesh();

@@ -1,6 +1,7 @@
 // What the method knows of a surface: a value, a gradient, and the two operators made of them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -42,6 +43,12 @@ public:
 
         /// Value and gradient together, for less than the price of both.
         virtual Sample sample(const Vec3& p) = 0;
+
+        /// Values at the corners of a lattice cell: corner k is bit 0 of k along the first axis, bit 1 along
+        /// the second, bit 2 along the third.
+        using CellValues = std::array<double, 8>;
+        /// Those of the cell whose lowest node is `low`, in whole numbers of the surface's own `lattice`.
+        virtual CellValues cell_values(const Vec3& low, const Eigen::Affine3d& lattice);
 
         /// O1: a point of the surface near `p` by the damped Newton iteration of the paper's algorithm 4,
         /// each step at most one resolution long. nullopt when there is no way to the surface from here: no
