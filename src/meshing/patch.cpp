@@ -82,10 +82,10 @@ bool has_any(const Triangle& t, const std::vector<int>& ascending) {
 }
 
 struct Numbers {
-    long components, euler;
+    long components, euler, loops;  // the last of the border
 };
 
-/// Of triangles with all their edges and corners.
+/// Of triangles with all their edges and corners, and a border that is pinched nowhere.
 Numbers numbers_of(const std::vector<Triangle>& triangles) {
     std::vector<int> corners;
     for (const Triangle& t : triangles) corners.insert(corners.end(), t.begin(), t.end());
@@ -94,13 +94,17 @@ Numbers numbers_of(const std::vector<Triangle>& triangles) {
     const auto number_of = [&](int v) {
         return static_cast<int>(std::lower_bound(corners.begin(), corners.end(), v) - corners.begin());
     };
-    DisjointSets sets(corners.size());
-    long components = static_cast<long>(corners.size()), edges = 0;
-    SortedEdges(triangles).for_each([&](int low, int high, int, int) {
-        components -= sets.join(number_of(low), number_of(high));
+    DisjointSets sets(corners.size()), along_border(corners.size());
+    long components = static_cast<long>(corners.size()), edges = 0, loops = 0;
+    SortedEdges(triangles).for_each([&](int low, int high, int upwards, int downwards) {
+        const int from = number_of(low), to = number_of(high);
+        components -= sets.join(from, to);
+        // The edge that closes a loop joins nothing.
+        if (upwards + downwards == 1) loops += !along_border.join(from, to);
         ++edges;
     });
-    return {components, static_cast<long>(corners.size()) - edges + static_cast<long>(triangles.size())};
+    return {components, static_cast<long>(corners.size()) - edges + static_cast<long>(triangles.size()),
+            loops};
 }
 
 /// Of a border that is pinched nowhere.
@@ -338,10 +342,14 @@ void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBi
         if (beside(v) != kNotLookedFor) return;
         const Vec3& p = mesh_.points[v];
         double nearest[2] = {kFar, kFar};
-        int at[2] = {-1, -1};  // the nearest that faces another way, and the same way
+        int at[2] = {-1, -1};      // the nearest that faces another way, and the same way
+        std::array<int, 16> seen;  // the first: a triangle is in several cubes
+        std::size_t count = 0;
         mesh.for_each_near(
             p,
             [&](int other) {
+                if (std::find(seen.begin(), seen.begin() + count, other) != seen.begin() + count) return;
+                if (count < seen.size()) seen[count++] = other;
                 const double to_box = mesh.box_of(other).squaredExteriorDistance(p);
                 // Another way counts only while none is known that faces the same way.
                 if (to_box >= nearest[1]) return;
@@ -379,6 +387,13 @@ std::vector<int> triangles_around(const Vec3& place, double reach, const Triangl
         result.erase(std::unique(result.begin(), result.end()), result.end());
     }
     return result;
+}
+
+bool have_same_numbers(const std::vector<int>& some, const TriangleBins& mesh, const std::vector<int>& others,
+                       const TriangleBins& other_mesh) {
+    const Numbers a = numbers_of(some_of(mesh.triangles(), some)),
+                  b = numbers_of(some_of(other_mesh.triangles(), others));
+    return a.components == b.components && a.euler == b.euler && a.loops == b.loops;
 }
 
 std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source) {

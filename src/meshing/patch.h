@@ -50,6 +50,11 @@ private:
 /// Ascending.
 std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh);
 
+/// Whether some triangles of a mesh have as many components, loops of their border, and handles as some of
+/// another. Their borders must be pinched nowhere.
+bool have_same_numbers(const std::vector<int>& some, const TriangleBins& mesh, const std::vector<int>& others,
+                       const TriangleBins& other_mesh);
+
 /// `gone`, ascending, with a border that is pinched nowhere, goes. The triangles of `source` that are nearest
 /// to them come, less a seam about as wide as its spacing; strips of triangles that face as the source does,
 /// if any do, fill the seam from each loop of the one border to one of the other, and what they cross of what

@@ -76,8 +76,9 @@ bool TriangleBins::any_meets(const Box& box) const {
 }
 
 TriangleBins::Range TriangleBins::range_of(const Box& box) const {
+    // What is not below 0 is rounded down by being made a whole number; floor is a call for each.
     const auto cube_at = [&](const Vec3& p) -> Eigen::Array3i {
-        const Eigen::Array3d at = ((p - low_) / size_).array().floor();
+        const Eigen::Array3d at = (p - low_).array() / size_;
         return at.max(0.0).min((count_ - 1).cast<double>()).cast<int>();
     };
     return {cube_at(box.min()), cube_at(box.max())};

@@ -158,6 +158,26 @@ public:
           resolution_(surface.resolution()),
           lattice_(surface.lattice_mesh(places, lattice_reach * resolution_), resolution_) {}
 
+    /// Puts those of some places first where mesh and lattice have other numbers around. Returns how many. A
+    /// patch seldom changes the numbers at the others, and takes ten times as long to make.
+    std::size_t put_differing_first(std::vector<Vec3>& places) {
+        const TriangleBins& bins = bins_of_mesh();
+        const auto around = [&](const Vec3& place, const TriangleBins& mesh) {
+            return triangles_around(place, kSmall * resolution_, mesh);
+        };
+        std::vector<char> differ(places.size());
+        tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
+            differ[p] = !have_same_numbers(around(places[p], bins), bins, around(places[p], lattice_.bins()),
+                                           lattice_.bins());
+        });
+        std::vector<Vec3> sorted;
+        for (const char first : {1, 0})
+            for (std::size_t p = 0; p < places.size(); ++p)
+                if (differ[p] == first) sorted.push_back(places[p]);
+        places = std::move(sorted);
+        return static_cast<std::size_t>(std::count(differ.begin(), differ.end(), 1));
+    }
+
     /// Those of some places where a patch would change the numbers; where none fits, too, if `or_unfit`.
     std::vector<Vec3> unlike(const std::vector<Vec3>& places, bool or_unfit) {
         const TriangleBins& bins = bins_of_mesh();
@@ -333,15 +353,20 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     std::vector<Vec3> places = and_unmatched(faulty);
     if (!places.empty() && places.size() <= kFewPlaces) {  // often that is enough
         make_lattice(places, kLookReach);
-        patch_near(places, -1, kSmall);
+        const auto differing = static_cast<std::ptrdiff_t>(patcher->put_differing_first(places));
+        patch_near({places.begin(), places.begin() + differing}, -1, kSmall);
+        if (now > 0) patch_near({places.begin() + differing, places.end()}, -1, kSmall);
         if (now == 0 || effort.is_enough()) return count;
     }
     // Some may be mended by now.
-    const std::vector<Vec3> suspicious = suspicious_places(trials.mesh(), faulty, thickness, resolution);
+    std::vector<Vec3> suspicious = suspicious_places(trials.mesh(), faulty, thickness, resolution);
     places = and_unmatched(suspicious);
     bool all_have_lattice = places.size() <= kMostWithLattice;  // for patches
     if (!places.empty()) {
         make_lattice(places, all_have_lattice ? kTriedReach : kLookReach);
+        const auto differing = static_cast<std::ptrdiff_t>(patcher->put_differing_first(suspicious));
+        patch_near(and_unmatched({suspicious.begin(), suspicious.begin() + differing}), -1, kSmall);
+        if (now == 0 || effort.is_enough()) return count;
         search(and_unmatched(patcher->unlike(suspicious, places.size() <= kMostPlaces)), all_have_lattice);
     }
     share = 1.0;

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numeric>
+#include <string>
 
 #include "isotrack/compare/baselines.h"
 #include "isotrack/meshing/mesh_topology.h"
@@ -159,6 +161,50 @@ TriangleMesh coarse_cube(const Mat3& turn) {
                     mesh.triangles.push_back({at(0, 0), at(1, 1), at(0, 1)});
                 }
     return mesh;
+}
+
+TEST(Patch, PartsHaveTheSameNumbersWhereTheyAreAlikeButForTheirTriangles) {
+    const TriangleMesh sphere = support::icosphere(3), fine = support::icosphere(4);
+    const TriangleBins bins(sphere.points, sphere.triangles, 0.1),
+        bins_of_fine(fine.points, fine.triangles, 0.1);
+    const auto around = [](const std::vector<Vec3>& places, double reach, const TriangleBins& mesh) {
+        std::vector<int> some;
+        for (const Vec3& place : places)
+            for (const int t : triangles_around(place, reach, mesh)) some.push_back(t);
+        std::sort(some.begin(), some.end());
+        return some;
+    };
+    const auto without = [](const std::vector<int>& all, const std::vector<int>& some) {
+        std::vector<int> rest;
+        std::set_difference(all.begin(), all.end(), some.begin(), some.end(), std::back_inserter(rest));
+        return rest;
+    };
+    const Vec3 up(0, 0, 1), down(0, 0, -1);
+    struct Part {
+        std::string name;
+        std::vector<int> coarse, other;  // triangles of either mesh
+    };
+    const auto part = [&](const std::string& name, const auto& of) {
+        return Part{name, of(bins), of(bins_of_fine)};
+    };
+    const std::vector<Part> parts = {
+        part("nothing", [&](const TriangleBins&) { return std::vector<int>(); }),
+        part("a disc", [&](const TriangleBins& m) { return around({up}, 0.7, m); }),
+        part("two discs",
+             [&](const TriangleBins& m) {
+                 return around({up, down}, 0.7, m);
+             }),
+        part("a ring",
+             [&](const TriangleBins& m) { return without(around({up}, 1.0, m), around({up}, 0.4, m)); }),
+        part("a ring and a disc",
+             [&](const TriangleBins& m) {
+                 return without(around({up, down}, 1.0, m), around({up}, 0.4, m));
+             }),
+        part("a sphere", [&](const TriangleBins& m) { return around({up}, 3.0, m); })};
+    for (const Part& one : parts)
+        for (const Part& other : parts)
+            EXPECT_EQ(have_same_numbers(one.coarse, bins, other.other, bins_of_fine), &one == &other)
+                << one.name << ", " << other.name;
 }
 
 TEST(Patch, LeavesAManifoldWhereItsFansClose) {
