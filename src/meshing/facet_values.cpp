@@ -33,7 +33,7 @@ std::vector<FacetValues> facet_values(const std::vector<Vec3>& vertices,
     ThreadProbes probes(surface);
     const auto read = [&](std::size_t t, int n, Surface::Probe& probe) {
         const auto& [i, j, k] = triangles[t];
-        facets[t].value[n] = probe.value(FacetValues::place(n, vertices[i], vertices[j], vertices[k]));
+        facets[t].read(n, vertices[i], vertices[j], vertices[k], probe);
     };
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         const auto& [i, j, k] = triangles[t];
@@ -64,7 +64,7 @@ std::vector<FacetValues> facet_values(const std::vector<Vec3>& vertices,
     parallel_for_each(vertices.size(), kGrain, [&](std::size_t v) {
         const int first = corners.first[v], end = corners.first[v + 1];
         if (first == end) return;
-        const double value = probes.local().value(vertices[v]);
+        const auto value = static_cast<float>(probes.local().value(vertices[v]));
         for (int e = first; e < end; ++e)
             facets[corners.corner[e] / 3].value[kAtCorner[corners.corner[e] % 3]] = value;
     });

@@ -10,13 +10,14 @@
 
 namespace isotrack {
 
+/// In floats, as the values of grids are, since there are many.
 struct FacetValues {
     static constexpr int kSteps = 3;  ///< Per edge, of the barycentric lattice that the points are.
     static constexpr int kPoints = (kSteps + 1) * (kSteps + 2) / 2;
 
-    Vec3 normal = Vec3::Zero();  ///< Unit; zero without area.
-    double area2 = 0.0;          ///< Twice the area.
-    std::array<double, kPoints> value{};
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< Unit; zero without area.
+    float area2 = 0.0f;                                ///< Twice the area.
+    std::array<float, kPoints> value{};
 
     /// The barycentric coordinates of the points.
     static constexpr std::array<std::array<double, 3>, kPoints> kPlace = [] {
@@ -33,15 +34,18 @@ struct FacetValues {
 
     FacetValues() = default;
     FacetValues(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) : FacetValues(a, b, c) {
-        for (int n = 0; n < kPoints; ++n) value[n] = probe.value(place(n, a, b, c));
+        for (int n = 0; n < kPoints; ++n) read(n, a, b, c, probe);
     }
     /// All values zero.
     FacetValues(const Vec3& a, const Vec3& b, const Vec3& c) {
         const Vec3 cross = (b - a).cross(c - a);
         const double length = cross.norm();
         if (!(length > 0.0)) return;
-        area2 = length;
-        normal = cross / length;
+        area2 = static_cast<float>(length);
+        normal = (cross / length).cast<float>();
+    }
+    void read(int n, const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe) {
+        value[n] = static_cast<float>(probe.value(place(n, a, b, c)));
     }
     static Vec3 place(int n, const Vec3& a, const Vec3& b, const Vec3& c) {
         const auto& [u, v, w] = kPlace[n];

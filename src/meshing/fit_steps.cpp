@@ -52,8 +52,8 @@ constexpr std::size_t kVertexGrain = 256, kTriangleGrain = 64;
 
 /// A triangle's share in the normal equations of its corners.
 struct Share {
-    Vec3 normal;
-    double area2;
+    Eigen::Vector3f normal;
+    float area2;
     std::array<double, 3> pull{};  ///< The integrals of the value times a corner's barycentric coordinate.
 
     explicit Share(const FacetValues& facet) : normal(facet.normal), area2(facet.area2) {
@@ -123,11 +123,13 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
         Vec3 sum = Vec3::Zero();
         for (int e = corners.first[v]; e < corners.first[v + 1]; ++e) {
             const Share& s = shares[corners.corner[e] / 3];
-            quadric += s.area2 * kMoments.one * s.normal * s.normal.transpose();
-            sum += s.normal;
+            const Vec3 normal = s.normal.cast<double>();
+            quadric += s.area2 * kMoments.one * normal * normal.transpose();
+            sum += normal;
         }
         for (int e = corners.first[v]; e < corners.first[v + 1]; ++e)
-            if (!(shares[corners.corner[e] / 3].normal.dot(sum) > kSmooth * sum.norm())) creased[v] = 1;
+            if (!(shares[corners.corner[e] / 3].normal.cast<double>().dot(sum) > kSmooth * sum.norm()))
+                creased[v] = 1;
         const double trace = quadric.trace();
         quadric.diagonal().array() += damping * trace;
         inverse[m] = trace > 0.0 ? Mat3(quadric.ldlt().solve(Mat3::Identity())) : Mat3(Mat3::Zero());
@@ -141,7 +143,7 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
             double shortest2 = std::numeric_limits<double>::infinity();
             for (int e = corners.first[v]; e < corners.first[v + 1]; ++e) {
                 const int t = corners.corner[e] / 3, k = corners.corner[e] % 3;
-                pull += shares[t].pull[k] * shares[t].normal;
+                pull += shares[t].pull[k] * shares[t].normal.cast<double>();
                 for (const int other : {triangles[t][(k + 1) % 3], triangles[t][(k + 2) % 3]})
                     shortest2 = std::min(shortest2, (vertices[other] - vertices[v]).squaredNorm());
             }
@@ -154,7 +156,9 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
         if (step + 1 < steps)
             parallel_for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
                 const auto& [i, j, k] = triangles[t];
-                const auto way = [&](int v) { return shares[t].normal.dot(to[v] - vertices[v]); };
+                const auto way = [&](int v) {
+                    return shares[t].normal.cast<double>().dot(to[v] - vertices[v]);
+                };
                 if (creased[i] || creased[j] || creased[k])
                     shares[t] = Share({to[i], to[j], to[k], probes.local()});
                 else

@@ -120,7 +120,7 @@ private:
     /// that is not known: 1 where the surface faces as the triangles do, less at a crease.
     double expected_error(int t, int other, int a, int b, int c, int d) const {
         const Vec3 &pa = points_[a], &pb = points_[b], old = points_[c] - pb, now = points_[d] - pa;
-        const Vec3 normal = (facets_[t].normal + facets_[other].normal).normalized();
+        const Vec3 normal = (facets_[t].normal + facets_[other].normal).cast<double>().normalized();
         const double across = normal.dot(now.cross(old));
         const double s = normal.dot(now.cross(pa - pb)) / across, r = normal.dot(old.cross(pa - pb)) / across;
         if (!(s > 0.0 && s < 1.0 && r > 0.0 && r < 1.0)) return std::numeric_limits<double>::infinity();
