@@ -17,8 +17,7 @@ namespace {
 
 constexpr int kBits = 21;  // of a cell's coordinate
 constexpr double kHalfRange = 1 << (kBits - 1);
-constexpr double kAtNode = 1e-4;    // of an edge
-constexpr float kLeastWay = 0.01f;  // of a sum of unit vectors
+constexpr double kAtNode = 1e-4;  // of an edge
 
 std::uint64_t packed(const Vec3& cell) {
     std::uint64_t result = 0;
@@ -50,7 +49,6 @@ public:
         for (int axis = 0; axis < 3; ++axis)
             along_[axis] = lattice.linear().col(axis).normalized().cast<float>();
     }
-    const Eigen::Vector3f (&along() const)[3] { return along_; }  ///< Unit.
     struct Edge {
         Vec3 low;  // its lower end
         int axis;
@@ -108,16 +106,16 @@ public:
     }
     void join_corners(int k, int l) { join(parts_, k, l); }
 
-    /// Calls `visit(place, way)` for each part of the surface: the mean of its crossings, in edges from the
-    /// lowest corner on, and the middle between the directions they go. They are of one part when the corners
-    /// inside at them are joined, and those outside, too. `along`: unit directions of the axes.
+    /// Calls `visit(place, ways)` for each part of the surface: the mean of its crossings, in edges from the
+    /// lowest corner on, and the directions they go. They are of one part when the corners inside at them are
+    /// joined, and those outside, too.
     template <typename Visit>
-    void for_each_mean(const Eigen::Vector3f (&along)[3], const Visit& visit) const {
+    void for_each_mean(const Visit& visit) const {
         struct Group {
             int ends = -1;  // numbers of the corners inside and outside
             int members = 0;
             Vec3 sum = Vec3::Zero();
-            unsigned ways = 0;  // bit axis, + 3 for those that go down
+            PackedCrossings::Ways ways = 0;
         };
         std::array<Group, 12> groups;
         int count = 0;
@@ -136,17 +134,7 @@ public:
                 group.sum[axis] += values_[k] / (values_[k] - values_[l]);
                 group.ways |= 1u << (goes_up ? axis : axis + 3);
             }
-        for (int g = 0; g < count; ++g) {
-            const Group& group = groups[g];
-            Eigen::Vector3f way = Eigen::Vector3f::Zero(), any = way;
-            for (int w = 0; w < 6; ++w) {
-                if ((group.ways >> w & 1u) == 0) continue;
-                any = w < 3 ? along[w] : -along[w - 3];
-                way += any;
-            }
-            const bool cancels_out = !(way.squaredNorm() > kLeastWay * kLeastWay);
-            visit(group.sum / group.members, cancels_out ? any : way.normalized());
-        }
+        for (int g = 0; g < count; ++g) visit(groups[g].sum / groups[g].members, groups[g].ways);
     }
 
 private:
@@ -176,7 +164,7 @@ CellPoints::CellPoints(const Surface& surface, const CrossingGrid& crossings,
     std::sort(joins_.begin(), joins_.end(), [](const Join& a, const Join& b) { return a.cell < b.cell; });
 }
 
-std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) {
+PackedCrossings CellPoints::around(const std::vector<int>& some) {
     const LatticeEdges edges(lattice_);
     constexpr std::size_t kBlock = 512;
     auto wanted = find_in_blocks<std::uint64_t>(
@@ -208,12 +196,13 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
     wanted = std::vector<std::uint64_t>();  // there are many
 
     // Nearly all cells have one part, which has a place from the start: there are many.
-    std::vector<Surface::Crossing> result;
-    result.reserve(fresh.size() + fresh.size() / 16);
-    result.resize(fresh.size());
+    using Entry = PackedCrossings::Entry;
+    PackedCrossings result(surface_.bounds().min(), lattice_);
+    result.entries.reserve(fresh.size() + fresh.size() / 16);
+    result.entries.resize(fresh.size());
     ThreadProbes probes(surface_);
-    const auto others = find_in_blocks<Surface::Crossing>(
-        fresh.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<Surface::Crossing>& found) {
+    const auto others = find_in_blocks<Entry>(
+        fresh.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<Entry>& found) {
             Surface::Probe& probe = probes.local();
             for (std::size_t i = begin; i < end; ++i) {
                 const Vec3 low = unpacked(fresh[i]);
@@ -223,21 +212,22 @@ std::vector<Surface::Crossing> CellPoints::around(const std::vector<int>& some) 
                                              [](const Join& j, std::uint64_t c) { return j.cell < c; });
                 for (; join != joins_.end() && join->cell == fresh[i]; ++join)
                     cell.join_corners(join->corners[0], join->corners[1]);
-                result[i].stands_for = 0;  // none
-                bool first = true;
-                cell.for_each_mean(edges.along(), [&](const Vec3& place, const Eigen::Vector3f& way) {
-                    const Surface::Crossing mean{lattice_ * (low + place), way};
-                    if (std::exchange(first, false))
-                        result[i] = mean;
+                Entry& first = result.entries[i];
+                first.ways = 0;  // none
+                cell.for_each_mean([&](const Vec3& place, PackedCrossings::Ways ways) {
+                    const Entry mean = result.packed(lattice_ * (low + place), ways);
+                    if (first.ways == 0)
+                        first = mean;
                     else
                         found.push_back(mean);
                 });
             }
         });
-    result.erase(
-        std::remove_if(result.begin(), result.end(), [](const auto& point) { return point.stands_for == 0; }),
-        result.end());
-    result.insert(result.end(), others.begin(), others.end());
+    auto& entries = result.entries;
+    entries.erase(
+        std::remove_if(entries.begin(), entries.end(), [](const Entry& entry) { return entry.ways == 0; }),
+        entries.end());
+    entries.insert(entries.end(), others.begin(), others.end());
     if (given_.empty()) {
         given_ = std::move(fresh);
     } else {

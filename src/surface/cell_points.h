@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "isotrack/surface/crossing_grid.h"
+#include "surface/packed_crossings.h"
 
 namespace isotrack {
 
@@ -19,7 +20,7 @@ public:
     /// part of the surface in a cell the mean of its crossings, where volumeToMesh has its vertices. Outward
     /// is the middle between the directions they go; one of them where these cancel out. Cells given before
     /// are left out. In an order that does not depend on the number of threads.
-    std::vector<Surface::Crossing> around(const std::vector<int>& some);
+    PackedCrossings around(const std::vector<int>& some);
 
 private:
     /// Two corners of a cell that hang together across a diagonal of one of its faces.

@@ -31,17 +31,17 @@ private:
     std::vector<Eigen::Vector3f> all_;
 };
 
-Box box_around(const std::vector<Surface::Crossing>& crossings) {
+Box box_around(const Surface::CrossingSequence& crossings) {
     Box box;
-    for (const Surface::Crossing& crossing : crossings) box.extend(crossing.point);
+    for (std::size_t c = 0; c < crossings.size; ++c) box.extend(crossings.at(c).point);
     return box;
 }
 
 }  // namespace
 
 // In braces, from left to right: the box is of a list that is still there.
-CrossingGrid::CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
-    : CrossingGrid{spacing, box_around(crossings), Surface::CrossingSequence(std::move(crossings))} {}
+CrossingGrid::CrossingGrid(Surface::CrossingSequence crossings, double spacing)
+    : CrossingGrid{spacing, box_around(crossings), std::move(crossings)} {}
 
 CrossingGrid::CrossingGrid(double spacing, const Vec3& origin, const Vec3& size, std::size_t crossings)
     : origin_(origin), size_(size), spacing_(spacing), width_(2.0 * spacing) {

@@ -105,24 +105,24 @@ bool BetweenCrossings::take_doubtful(std::size_t crossing, const MeshDistances& 
     return true;
 }
 
-std::vector<Surface::Crossing> BetweenCrossings::points_beside(const std::vector<int>& doubtful) {
+PackedCrossings BetweenCrossings::points_beside(const std::vector<int>& doubtful) {
     if (!crossings_.thinned_out(surface_)) return cells_.around(doubtful);
-    std::vector<Surface::Crossing> result;
+    PackedCrossings result(surface_.bounds().min(), surface_.lattice());
     for (const bool flat : {false, true}) {
         std::vector<Vec3> places;
         for (const int c : doubtful)
             if (const Surface::Crossing crossing = crossings_[c]; crossing.flat == flat)
                 places.push_back(crossing.point);
         const double within = flat ? kStandsForOnFlat : kStandsForWithin;
-        const auto near = surface_.crossings_near(places, within * crossings_.spacing());
-        result.insert(result.end(), near.begin(), near.end());
+        for (const Surface::Crossing& near : surface_.crossings_near(places, within * crossings_.spacing()))
+            result.entries.push_back(result.packed(near));
     }
     return result;
 }
 
-std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>& vertices,
-                                                        const std::vector<Triangle>& triangles,
-                                                        const MeshDistances& at_crossings) {
+PackedCrossings BetweenCrossings::points(const std::vector<Vec3>& vertices,
+                                         const std::vector<Triangle>& triangles,
+                                         const MeshDistances& at_crossings) {
     Flags at_fold(crossings_.size());
     flag_at_folds(triangles, turns_at_vertices(vertices, triangles), vertices, at_crossings, at_fold);
     looked_at_.resize(crossings_.size(), 0);
@@ -134,10 +134,9 @@ std::vector<Surface::Crossing> BetweenCrossings::points(const std::vector<Vec3>&
         }));
 }
 
-std::vector<Surface::Crossing> BetweenCrossings::points_near(const Changes& changes,
-                                                             const std::vector<Vec3>& vertices,
-                                                             const std::vector<Triangle>& triangles,
-                                                             const MeshDistances& at_crossings) {
+PackedCrossings BetweenCrossings::points_near(const Changes& changes, const std::vector<Vec3>& vertices,
+                                              const std::vector<Triangle>& triangles,
+                                              const MeshDistances& at_crossings) {
     // Crossings whose distances changed are looked at; and since normals turned at the corners of what came,
     // those along the triangles there, which may be at a fold now.
     std::vector<char> is_near(crossings_.size(), 0);

@@ -26,9 +26,8 @@ public:
     /// two crossings may be much farther than either, but fewer where the surface is flat. Where some
     /// crossings stand for others: those others. Else points in cells, of those with an ambiguous face in
     /// all. What was returned before is left out.
-    std::vector<Surface::Crossing> points(const std::vector<Vec3>& vertices,
-                                          const std::vector<Triangle>& triangles,
-                                          const MeshDistances& at_crossings);
+    PackedCrossings points(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+                           const MeshDistances& at_crossings);
 
     /// What has changed since a mesh was looked at last.
     struct Changes {
@@ -37,9 +36,8 @@ public:
         std::vector<int> crossings;            ///< Whose distances may be others, each at least once.
     };
     /// The same of a mesh that differs by so much from the one looked at last.
-    std::vector<Surface::Crossing> points_near(const Changes& changes, const std::vector<Vec3>& vertices,
-                                               const std::vector<Triangle>& triangles,
-                                               const MeshDistances& at_crossings);
+    PackedCrossings points_near(const Changes& changes, const std::vector<Vec3>& vertices,
+                                const std::vector<Triangle>& triangles, const MeshDistances& at_crossings);
 
 private:
     using Flags = std::vector<std::atomic<char>>;
@@ -49,7 +47,7 @@ private:
                        Flags& at_fold) const;
     /// Whether it is looked at from now on, and was not before.
     bool take_doubtful(std::size_t crossing, const MeshDistances& at_crossings, const Flags& at_fold);
-    std::vector<Surface::Crossing> points_beside(const std::vector<int>& doubtful);
+    PackedCrossings points_beside(const std::vector<int>& doubtful);
 
     const Surface& surface_;
     const CrossingGrid& crossings_;

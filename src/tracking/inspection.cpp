@@ -279,14 +279,14 @@ Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     return result;
 }
 
-void Inspector::set_unreachable_aside(std::vector<Surface::Crossing>& points) {
+void Inspector::set_unreachable_aside(PackedCrossings& points) {
     constexpr double kNear = 0.1, kReachable = 0.95;  // tolerances off the surface
     ThreadProbes probes(surface_);
     std::vector<char> keep(points.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 64), [&](const auto& range) {
         Surface::Probe& probe = probes.local();
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            const Vec3& p = points[i].point;
+            const Vec3 p = points.point(i);
             keep[i] = std::abs(probe.value(p)) < kNear * limits_.tolerance;
             if (keep[i]) continue;
             keep[i] = surface_near(probe, p, kReachable * limits_.tolerance).has_value();
@@ -294,12 +294,12 @@ void Inspector::set_unreachable_aside(std::vector<Surface::Crossing>& points) {
     });
     for (std::size_t i = 0; i < points.size(); ++i)
         if (!keep[i]) unreachable_.push_back(points[i]);
-    compact(points, keep);
+    compact(points.entries, keep);
 }
 
-void Inspector::measure_between(std::vector<Surface::Crossing> points, const FrameMesh& mesh,
+void Inspector::measure_between(Surface::CrossingSequence points, const FrameMesh& mesh,
                                 Inspection& inspection) {
-    if (points.empty()) return;
+    if (points.size == 0) return;
     between_.emplace_back(std::move(points), surface_.resolution());
     distances_.emplace_back(between_.back(), cutoff()).measure(mesh.vertices, mesh.carved.triangles, {});
     missed_.emplace_back();
@@ -319,11 +319,11 @@ void Inspector::look_between(const FrameMesh& mesh, Inspection& inspection) {
                                                         distances_.front());
     since_look_.emplace();
     if (!thins_out()) set_unreachable_aside(points);
-    measure_between(std::move(points), mesh, inspection);
+    measure_between(Surface::CrossingSequence(std::move(points)), mesh, inspection);
 }
 
 void Inspector::look_off_surface(const FrameMesh& mesh, Inspection& inspection) {
-    measure_between(std::exchange(unreachable_, {}), mesh, inspection);
+    measure_between(Surface::CrossingSequence(std::exchange(unreachable_, {})), mesh, inspection);
 }
 
 std::vector<Surface::Crossing> Inspector::newly_missed(const Inspection& now,

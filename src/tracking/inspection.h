@@ -110,9 +110,8 @@ private:
     void take_missed(std::size_t d, Inspection& result);  // by distances_[d]
     /// Means of crossings may be so far off the surface that a mesh with vertices on it is beyond the
     /// tolerance of them: those are set aside.
-    void set_unreachable_aside(std::vector<Surface::Crossing>& points);
-    void measure_between(std::vector<Surface::Crossing> points, const FrameMesh& mesh,
-                         Inspection& inspection);
+    void set_unreachable_aside(PackedCrossings& points);
+    void measure_between(Surface::CrossingSequence points, const FrameMesh& mesh, Inspection& inspection);
     void forget_distances();
     double cutoff() const;
     /// `spacing` in resolutions.

@@ -152,7 +152,7 @@ TEST(FacingTriangle, IsAsFarAsItsNearestPointUpToALimit) {
 TEST(CrossingDistances, AreInfiniteWithoutAMesh) {
     const CrossingGrid grid(*shapes::sphere({0, 0, 0}, 1.0, 0.2));
     for (const double d : crossing_distances({}, {}, grid, 1.0)) EXPECT_TRUE(std::isinf(d));
-    EXPECT_TRUE(crossing_distances({}, {}, CrossingGrid({}, 1.0), 1.0).empty());
+    EXPECT_TRUE(crossing_distances({}, {}, CrossingGrid(std::vector<Surface::Crossing>(), 1.0), 1.0).empty());
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ TEST_P(Solids, HaveThemWhereTheDualMeshHasItsVertices) {
     std::vector<openvdb::Vec4I> quads;
     openvdb::tools::volumeToMesh(*surface->grid(), vertices, quads);
     const auto points = CellPoints(*surface, *crossings, surface->diagonals()).around(all);
-    const CrossingGrid grid(points, kVoxel);
+    const CrossingGrid grid(Surface::CrossingSequence(points), kVoxel);
     const auto has_node_just_inside = [&](const Vec3& vertex) {
         const Vec3 low = (surface->lattice().inverse() * vertex).array().floor();
         for (int k = 0; k < 8; ++k) {
@@ -93,7 +93,7 @@ TEST(CellPoints, AreTheVerticesOfVolumeToMeshAtAmbiguousFaces) {
     std::iota(all.begin(), all.end(), 0);
     const auto points = CellPoints(surface, crossings, surface.diagonals()).around(all);
     EXPECT_EQ(points.size(), vertices.size());
-    const CrossingGrid found(points, 1.0);
+    const CrossingGrid found(Surface::CrossingSequence(points), 1.0);
     for (const openvdb::Vec3s& v : vertices) {
         const Vec3 vertex(v.x(), v.y(), v.z()), reach = Vec3::Constant(1e-4);
         bool any = false;

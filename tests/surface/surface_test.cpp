@@ -326,7 +326,8 @@ TEST(CrossingGrid, FindsWhatIsInABoxAndNothingElse) {
             EXPECT_EQ(found, expected);
         }
     }
-    CrossingGrid({}, 1.0).for_each_in(Box(Vec3(-1, -1, -1), Vec3(1, 1, 1)), [](std::size_t) { FAIL(); });
+    CrossingGrid(std::vector<Surface::Crossing>(), 1.0)
+        .for_each_in(Box(Vec3(-1, -1, -1), Vec3(1, 1, 1)), [](std::size_t) { FAIL(); });
 }
 
 }  // namespace

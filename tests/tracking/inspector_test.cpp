@@ -30,8 +30,8 @@ TEST(Inspector, FindsWhatIsMissedBetweenCrossingsThatAreReached) {
     const CrossingGrid crossings(*box);
     std::vector<int> all(crossings.size());
     std::iota(all.begin(), all.end(), 0);
-    const CrossingGrid cells(CellPoints(*box, crossings, box->diagonals()).around(all),
-                             kResolution);
+    const CrossingGrid cells(
+        Surface::CrossingSequence(CellPoints(*box, crossings, box->diagonals()).around(all)), kResolution);
     Carved carved(*box, 1.0);
     const FrameMesh mesh = carved.mesh();
     int found = 0;
@@ -74,9 +74,12 @@ TEST(Inspector, FindsTheSameBetweenCrossingsByWhatChanged) {
         return distances;
     };
     MeshDistances kept = measured(mesh.vertices);
-    const auto sorted = [](const std::vector<Surface::Crossing>& points) {
+    const auto sorted = [](const PackedCrossings& points) {
         std::vector<std::array<double, 3>> result;
-        for (const auto& c : points) result.push_back({c.point.x(), c.point.y(), c.point.z()});
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            const Vec3 p = points.point(i);
+            result.push_back({p.x(), p.y(), p.z()});
+        }
         std::sort(result.begin(), result.end());
         return result;
     };

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "isotrack/surface/surface.h"
@@ -19,7 +20,9 @@ public:
         : CrossingGrid(std::max(surface.resolution(), apart), surface.bounds(),
                        surface.crossing_sequence(apart)) {}
     /// `spacing` of the crossings, world units. Few different directions, as those of a lattice.
-    CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing);
+    CrossingGrid(Surface::CrossingSequence crossings, double spacing);
+    CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
+        : CrossingGrid(Surface::CrossingSequence(std::move(crossings)), spacing) {}
 
     std::size_t size() const { return entries_.size(); }
     bool empty() const { return entries_.empty(); }

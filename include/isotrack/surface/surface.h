@@ -111,9 +111,11 @@ public:
         CrossingSequence() = default;
         CrossingSequence(std::size_t count, std::function<Crossing(std::size_t)> make)
             : size(count), at(std::move(make)) {}
-        /// Of a list that is there.
-        explicit CrossingSequence(std::vector<Crossing> list)
-            : size(list.size()), at([held = std::move(list)](std::size_t i) { return held[i]; }) {}
+        /// Of a list that is there, of crossings or of what becomes one.
+        template <typename List>
+        explicit CrossingSequence(List list)
+            : size(list.size()),
+              at([held = std::move(list)](std::size_t i) -> Crossing { return held[i]; }) {}
     };
     /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
     /// in the same order. Of those within a cube of an edge of about `apart` some along one axis may stand

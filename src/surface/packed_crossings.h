@@ -1,0 +1,68 @@
+// A list of crossings in less memory.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "isotrack/surface/surface.h"
+
+namespace isotrack {
+
+/// In 16 bytes each, less than half: their directions are those of the edges of a lattice, or middles of some
+/// of these, and points are floats from a place on.
+class PackedCrossings {
+public:
+    /// Some directions: bit k for up along axis k, bit 3 + k for down.
+    using Ways = std::uint32_t;
+    struct Entry {
+        Eigen::Vector3f offset;  // from the origin
+        Ways ways;
+    };
+    std::vector<Entry> entries;
+
+    PackedCrossings() = default;
+    /// `origin`: points are exact to 1e-7 of how far they are from it.
+    PackedCrossings(const Vec3& origin, const Eigen::Affine3d& lattice) : origin_(origin) {
+        for (int axis = 0; axis < 3; ++axis) {
+            along_[axis] = lattice.linear().col(axis).normalized().cast<float>();
+            along_[axis + 3] = -along_[axis];
+        }
+        for (Ways ways = 0; ways < outward_.size(); ++ways) outward_[ways] = middle_of(ways);
+    }
+
+    std::size_t size() const { return entries.size(); }
+    bool empty() const { return entries.empty(); }
+    Vec3 point(std::size_t i) const { return origin_ + entries[i].offset.cast<double>(); }
+    Surface::Crossing operator[](std::size_t i) const { return {point(i), outward_[entries[i].ways]}; }
+
+    /// One that goes the middle between some ways, which is any of them where they cancel out.
+    Entry packed(const Vec3& point, Ways ways) const { return {(point - origin_).cast<float>(), ways}; }
+    /// One that goes along an edge, and stands for no other.
+    Entry packed(const Surface::Crossing& crossing) const {
+        const auto nearest = std::max_element(
+            along_.begin(), along_.end(),
+            [&](const auto& a, const auto& b) { return a.dot(crossing.outward) < b.dot(crossing.outward); });
+        return packed(crossing.point, 1u << (nearest - along_.begin()));
+    }
+
+private:
+    Eigen::Vector3f middle_of(Ways ways) const {
+        constexpr float kLeast = 0.01f;  // length of a sum that does not cancel out
+        Eigen::Vector3f sum = Eigen::Vector3f::Zero(), any = sum;
+        for (std::size_t w = 0; w < along_.size(); ++w) {
+            if ((ways >> w & 1u) == 0) continue;
+            any = along_[w];
+            sum += any;
+        }
+        return sum.squaredNorm() > kLeast * kLeast ? Eigen::Vector3f(sum.normalized()) : any;
+    }
+
+    Vec3 origin_ = Vec3::Zero();
+    std::array<Eigen::Vector3f, 6> along_;     // unit, by way
+    std::array<Eigen::Vector3f, 64> outward_;  // by ways
+};
+
+}  // namespace isotrack
