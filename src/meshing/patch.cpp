@@ -82,7 +82,8 @@ bool has_any(const Triangle& t, const std::vector<int>& ascending) {
 }
 
 struct Numbers {
-    long components, euler, loops;  // the last of the border
+    long components, euler;
+    long loops;  // that the border has
 };
 
 /// Of triangles with all their edges and corners, and a border that is pinched nowhere.

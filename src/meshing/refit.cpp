@@ -132,7 +132,7 @@ private:
                 return std::find(triangles_[of].begin(), triangles_[of].end(), v) - triangles_[of].begin();
             };
             const auto at_b = corner(b), at_c = corner(c);
-            const double weight = facet.area2 / FacetValues::kPoints;
+            const double weight = double{facet.area2} / FacetValues::kPoints;
             for (int n = 0; n < FacetValues::kPoints; ++n) {
                 const auto& place = FacetValues::kPlace[n];
                 const double x = facet.value[n],

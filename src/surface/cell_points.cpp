@@ -49,25 +49,24 @@ public:
         for (int axis = 0; axis < 3; ++axis)
             along_[axis] = lattice.linear().col(axis).normalized().cast<float>();
     }
-    struct Edge {
-        Vec3 low;  // its lower end
-        int axis;
-        bool upward;  // goes out there
-    };
-    Edge edge_of(const Surface::Crossing& crossing) const {
-        const Eigen::Vector3f& outward = crossing.outward;
+    /// Calls `visit(low, axis)` for the edge that a crossing is on, by its lower end. Next to a node, which
+    /// may be inside by rounding, that may be one of two.
+    template <typename Visit>
+    void for_each_edge_of(const Surface::Crossing& crossing, const Visit& visit) const {
         int axis = 0;
         for (int other = 1; other < 3; ++other)
-            if (std::abs(along_[other].dot(outward)) > std::abs(along_[axis].dot(outward))) axis = other;
+            if (std::abs(along_[other].dot(crossing.outward)) > std::abs(along_[axis].dot(crossing.outward)))
+                axis = other;
         const Vec3 p = to_lattice_ * crossing.point;
         Vec3 low;
         for (int k = 0; k < 3; ++k) low[k] = whole_below(p[k] + 0.5);
-        const bool upward = along_[axis].dot(outward) > 0.0f;
-        // At a node, which is outside as all are where the value is 0, the edge is the one that goes out to
-        // it.
-        const bool at_node = std::abs(p[axis] - low[axis]) < kAtNode;
-        low[axis] = at_node ? low[axis] - upward : whole_below(p[axis]);
-        return {low, axis, upward};
+        if (std::abs(p[axis] - low[axis]) < kAtNode) {
+            visit(low, axis);
+            low[axis] -= 1.0;
+        } else {
+            low[axis] = whole_below(p[axis]);
+        }
+        visit(low, axis);
     }
 
 private:
@@ -170,16 +169,16 @@ PackedCrossings CellPoints::around(const std::vector<int>& some) {
     auto wanted = find_in_blocks<std::uint64_t>(
         some.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<std::uint64_t>& found) {
             found.reserve(4 * (end - begin));
-            for (std::size_t i = begin; i < end; ++i) {
-                const auto [low, axis, upward] = edges.edge_of(crossings_[some[i]]);
-                for (const double u : {0.0, 1.0})
-                    for (const double w : {0.0, 1.0}) {
-                        Vec3 cell = low;
-                        cell[(axis + 1) % 3] -= u;
-                        cell[(axis + 2) % 3] -= w;
-                        found.push_back(packed(cell));
-                    }
-            }
+            for (std::size_t i = begin; i < end; ++i)
+                edges.for_each_edge_of(crossings_[some[i]], [&](const Vec3& low, int axis) {
+                    for (const double u : {0.0, 1.0})
+                        for (const double w : {0.0, 1.0}) {
+                            Vec3 cell = low;
+                            cell[(axis + 1) % 3] -= u;
+                            cell[(axis + 2) % 3] -= w;
+                            found.push_back(packed(cell));
+                        }
+                });
             // Most are around several crossings of the block.
             std::sort(found.begin(), found.end());
             found.erase(std::unique(found.begin(), found.end()), found.end());

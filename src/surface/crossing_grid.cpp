@@ -39,7 +39,7 @@ Box box_around(const Surface::CrossingSequence& crossings) {
 
 }  // namespace
 
-// In braces, from left to right: the box is of a list that is still there.
+// In braces, from left to right: the box is of crossings that are still there.
 CrossingGrid::CrossingGrid(Surface::CrossingSequence crossings, double spacing)
     : CrossingGrid{spacing, box_around(crossings), std::move(crossings)} {}
 

@@ -38,9 +38,9 @@ public:
     Vec3 point(std::size_t i) const { return origin_ + entries[i].offset.cast<double>(); }
     Surface::Crossing operator[](std::size_t i) const { return {point(i), outward_[entries[i].ways]}; }
 
-    /// One that goes the middle between some ways, which is any of them where they cancel out.
+    /// One that goes the middle between some ways, at least one; any of them where they cancel out.
     Entry packed(const Vec3& point, Ways ways) const { return {(point - origin_).cast<float>(), ways}; }
-    /// One that goes along an edge, and stands for no other.
+    /// One that goes along an edge. That it stands for others is lost.
     Entry packed(const Surface::Crossing& crossing) const {
         const auto nearest = std::max_element(
             along_.begin(), along_.end(),

@@ -114,8 +114,9 @@ PackedCrossings BetweenCrossings::points_beside(const std::vector<int>& doubtful
             if (const Surface::Crossing crossing = crossings_[c]; crossing.flat == flat)
                 places.push_back(crossing.point);
         const double within = flat ? kStandsForOnFlat : kStandsForWithin;
-        for (const Surface::Crossing& near : surface_.crossings_near(places, within * crossings_.spacing()))
-            result.entries.push_back(result.packed(near));
+        const auto near = surface_.crossings_near(places, within * crossings_.spacing());
+        result.entries.reserve(result.size() + near.size());
+        for (const Surface::Crossing& crossing : near) result.entries.push_back(result.packed(crossing));
     }
     return result;
 }

@@ -351,12 +351,14 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
         return some;
     };
     std::vector<Vec3> places = and_unmatched(faulty);
+    bool small_were_tried = false;
     if (!places.empty() && places.size() <= kFewPlaces) {  // often that is enough
         make_lattice(places, kLookReach);
         const auto differing = static_cast<std::ptrdiff_t>(patcher->put_differing_first(places));
         patch_near({places.begin(), places.begin() + differing}, -1, kSmall);
         if (now > 0) patch_near({places.begin() + differing, places.end()}, -1, kSmall);
         if (now == 0 || effort.is_enough()) return count;
+        small_were_tried = true;
     }
     // Some may be mended by now.
     std::vector<Vec3> suspicious = suspicious_places(trials.mesh(), faulty, thickness, resolution);
@@ -364,9 +366,11 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     bool all_have_lattice = places.size() <= kMostWithLattice;  // for patches
     if (!places.empty()) {
         make_lattice(places, all_have_lattice ? kTriedReach : kLookReach);
-        const auto differing = static_cast<std::ptrdiff_t>(patcher->put_differing_first(suspicious));
-        patch_near(and_unmatched({suspicious.begin(), suspicious.begin() + differing}), -1, kSmall);
-        if (now == 0 || effort.is_enough()) return count;
+        if (!small_were_tried) {
+            const auto differing = static_cast<std::ptrdiff_t>(patcher->put_differing_first(suspicious));
+            patch_near(and_unmatched({suspicious.begin(), suspicious.begin() + differing}), -1, kSmall);
+            if (now == 0 || effort.is_enough()) return count;
+        }
         search(and_unmatched(patcher->unlike(suspicious, places.size() <= kMostPlaces)), all_have_lattice);
     }
     share = 1.0;

@@ -205,6 +205,17 @@ TEST(Patch, PartsHaveTheSameNumbersWhereTheyAreAlikeButForTheirTriangles) {
         for (const Part& other : parts)
             EXPECT_EQ(have_same_numbers(one.coarse, bins, other.other, bins_of_fine), &one == &other)
                 << one.name << ", " << other.name;
+    // A torus has as many components and loops as a sphere, components and the Euler number of a ring, and
+    // loops and the Euler number of nothing.
+    const TriangleMesh torus = support::torus(20, 12), fine_torus = support::torus(40, 24);
+    const TriangleBins bins_of_torus(torus.points, torus.triangles, 0.1),
+        bins_of_fine_torus(fine_torus.points, fine_torus.triangles, 0.1);
+    const auto all = around({up}, 9.0, bins_of_torus);
+    ASSERT_EQ(all.size(), torus.triangles.size());
+    EXPECT_TRUE(
+        have_same_numbers(all, bins_of_torus, around({up}, 9.0, bins_of_fine_torus), bins_of_fine_torus));
+    for (const Part& other : parts)
+        EXPECT_FALSE(have_same_numbers(all, bins_of_torus, other.other, bins_of_fine)) << other.name;
 }
 
 TEST(Patch, LeavesAManifoldWhereItsFansClose) {

@@ -6,6 +6,7 @@
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <optional>
 #include <random>
@@ -44,19 +45,7 @@ TEST_P(Solids, HaveThemWhereTheDualMeshHasItsVertices) {
     openvdb::tools::volumeToMesh(*surface->grid(), vertices, quads);
     const auto points = CellPoints(*surface, *crossings, surface->diagonals()).around(all);
     const CrossingGrid grid(Surface::CrossingSequence(points), kVoxel);
-    const auto has_node_just_inside = [&](const Vec3& vertex) {
-        const Vec3 low = (surface->lattice().inverse() * vertex).array().floor();
-        for (int k = 0; k < 8; ++k) {
-            const openvdb::Coord node(static_cast<int>(low.x()) + (k & 1),
-                                      static_cast<int>(low.y()) + (k >> 1 & 1),
-                                      static_cast<int>(low.z()) + (k >> 2));
-            const float value = surface->grid()->tree().getValue(node);
-            if (value < 0.0f && value > -1e-6f * static_cast<float>(kVoxel)) return true;
-        }
-        return false;
-    };
     std::vector<char> met(points.size(), 0);
-    std::size_t missed = 0;
     for (const openvdb::Vec3s& v : vertices) {
         const Vec3 vertex(v.x(), v.y(), v.z()), reach = Vec3::Constant(1e-4 * kVoxel);
         int there = 0;
@@ -64,12 +53,9 @@ TEST_P(Solids, HaveThemWhereTheDualMeshHasItsVertices) {
             met[c] = 1;
             ++there;
         });
-        // The crossings next to a node that is inside by rounding alone are all on it.
-        EXPECT_TRUE(there == 1 || has_node_just_inside(vertex)) << vertex.transpose();
-        missed += there != 1;
+        EXPECT_EQ(there, 1) << vertex.transpose();
     }
-    EXPECT_LT(missed, vertices.size() / 100);
-    EXPECT_EQ(std::count(met.begin(), met.end(), 0), 2 * static_cast<std::ptrdiff_t>(missed));
+    EXPECT_EQ(std::count(met.begin(), met.end(), 0), 0);
 }
 
 /// Random values on a few nodes: many ambiguous faces, cells with up to twelve crossings.
@@ -100,6 +86,36 @@ TEST(CellPoints, AreTheVerticesOfVolumeToMeshAtAmbiguousFaces) {
         found.for_each_in(Box(vertex - reach, vertex + reach), [&](std::size_t) { any = true; });
         EXPECT_TRUE(any) << vertex.transpose();
     }
+}
+
+TEST_P(Solids, GoOutwards) {
+    const auto points = CellPoints(*surface, *crossings, surface->diagonals()).around(all);
+    const auto probe = surface->probe();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const Vec3 outward = points[i].outward.cast<double>();
+        EXPECT_NEAR(outward.norm(), 1.0, 1e-6);
+        EXPECT_GT(outward.dot(probe->normal(points.point(i))), 0.3) << points.point(i).transpose();
+    }
+}
+
+/// A cube whose outermost nodes are inside by rounding alone: every crossing is next to one of them.
+TEST(CellPoints, AreFoundFromNodesThatAreInsideByRounding) {
+    constexpr int kHalf = 5;
+    const auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    for (auto c = openvdb::CoordBBox(openvdb::Coord(-8), openvdb::Coord(8)).begin(); c; ++c) {
+        const int depth = std::max({std::abs((*c).x()), std::abs((*c).y()), std::abs((*c).z())}) - kHalf;
+        grid->tree().setValue(*c, depth == 0 ? -1e-9f : static_cast<float>(std::clamp(depth, -3, 3)));
+    }
+    const LevelSet surface(grid);
+    const CrossingGrid crossings(surface);
+    std::vector<int> all(crossings.size());
+    std::iota(all.begin(), all.end(), 0);
+    ASSERT_EQ(all.size(), 6u * 11 * 11);
+    const auto points = CellPoints(surface, crossings, surface.diagonals()).around(all);
+    EXPECT_EQ(points.size(), 12u * 12 * 12 - 10 * 10 * 10);  // all cells with corners on both sides
+    for (std::size_t i = 0; i < points.size(); ++i)
+        EXPECT_NEAR(points.point(i).lpNorm<Eigen::Infinity>(), kHalf, 1e-5);
 }
 
 TEST_P(Solids, HaveEachOfThemOnce) {

@@ -19,15 +19,16 @@ public:
     explicit CrossingGrid(const Surface& surface, double apart = 0.0)
         : CrossingGrid(std::max(surface.resolution(), apart), surface.bounds(),
                        surface.crossing_sequence(apart)) {}
-    /// `spacing` of the crossings, world units. Few different directions, as those of a lattice.
+    /// `spacing` of the crossings, world units. Few different directions, as those of a lattice. Each is
+    /// asked for twice.
     CrossingGrid(Surface::CrossingSequence crossings, double spacing);
     CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
         : CrossingGrid(Surface::CrossingSequence(std::move(crossings)), spacing) {}
 
     std::size_t size() const { return entries_.size(); }
     bool empty() const { return entries_.empty(); }
-    /// Its point is exact to 1e-7 of the extent of the surface's bounds, or of them all where they came as a
-    /// list.
+    /// Its point is exact to 1e-7 of the extent of the surface's bounds, or of all crossings where these were
+    /// given.
     Surface::Crossing operator[](std::size_t i) const {
         const Entry& e = entries_[i];
         return {origin_ + e.offset.cast<double>(), directions_[e.direction],

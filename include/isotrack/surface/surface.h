@@ -47,7 +47,8 @@ public:
         /// Values at the corners of a lattice cell: corner k is bit 0 of k along the first axis, bit 1 along
         /// the second, bit 2 along the third.
         using CellValues = std::array<double, 8>;
-        /// Those of the cell whose lowest node is `low`, in whole numbers of the surface's own `lattice`.
+        /// Those of the cell whose lowest node is `low`, in whole numbers of `lattice`: the surface's own,
+        /// which not every probe knows. They must be below 0 where `crossing_sequence` has nodes inside.
         virtual CellValues cell_values(const Vec3& low, const Eigen::Affine3d& lattice);
 
         /// O1: a point of the surface near `p` by the damped Newton iteration of the paper's algorithm 4,
@@ -111,7 +112,8 @@ public:
         CrossingSequence() = default;
         CrossingSequence(std::size_t count, std::function<Crossing(std::size_t)> make)
             : size(count), at(std::move(make)) {}
-        /// Of a list that is there, of crossings or of what becomes one.
+        /// Of a list that is there. It can be copied, has a `size()`, and a `list[i]` that becomes a
+        /// crossing, which threads may ask for at once.
         template <typename List>
         explicit CrossingSequence(List list)
             : size(list.size()),
