@@ -23,7 +23,6 @@ public:
     };
     std::vector<Entry> entries;
 
-    PackedCrossings() = default;
     /// `origin`: points are exact to 1e-7 of how far they are from it.
     PackedCrossings(const Vec3& origin, const Eigen::Affine3d& lattice) : origin_(origin) {
         for (int axis = 0; axis < 3; ++axis) {
@@ -34,7 +33,6 @@ public:
     }
 
     std::size_t size() const { return entries.size(); }
-    bool empty() const { return entries.empty(); }
     Vec3 point(std::size_t i) const { return origin_ + entries[i].offset.cast<double>(); }
     Surface::Crossing operator[](std::size_t i) const { return {point(i), outward_[entries[i].ways]}; }
 
@@ -60,7 +58,7 @@ private:
         return sum.squaredNorm() > kLeast * kLeast ? Eigen::Vector3f(sum.normalized()) : any;
     }
 
-    Vec3 origin_ = Vec3::Zero();
+    Vec3 origin_;
     std::array<Eigen::Vector3f, 6> along_;     // unit, by way
     std::array<Eigen::Vector3f, 64> outward_;  // by ways
 };

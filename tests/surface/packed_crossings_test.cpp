@@ -23,7 +23,7 @@ TEST(PackedCrossings, AreThoseThatWerePacked) {
     const Eigen::Affine3d lattice = some_lattice();
     const Vec3 origin = lattice * Vec3(-10, 0, 5);
     PackedCrossings list(origin, lattice);
-    EXPECT_TRUE(list.empty());
+    EXPECT_EQ(list.size(), 0u);
     std::mt19937 random(2);
     std::uniform_real_distribution<double> coordinate(0.0, 50.0);
     std::vector<Surface::Crossing> crossings;
