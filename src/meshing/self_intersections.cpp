@@ -2,15 +2,17 @@
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/box_intersection_d.h>
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <string>
 
 #include "isotrack/error.h"
+#include "meshing/triangle_box.h"
+#include "parallel_for_each.h"
 
 namespace isotrack {
 namespace {
@@ -113,70 +115,81 @@ constexpr std::size_t kSlabSize = 4096;               // boxes that begin in a s
 constexpr std::size_t kFewest = 4, kLeastSlab = 512;  // slabs, unless they would have fewer boxes
 constexpr std::ptrdiff_t kScanBelow = 100;  // boxes; splitting further costs more than comparing all
 
-/// Boxes of the triangles with area, in the mesh's order.
-std::vector<TriangleBox> boxes_of(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
-    Box bounds;
-    for (std::size_t i = 0; i < points.size(); ++i) {
+/// Throws where a vertex is not finite or a triangle names one that is not there.
+void check(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
+    for (std::size_t i = 0; i < points.size(); ++i)
         if (!points[i].allFinite()) throw InputError("vertex " + std::to_string(i) + " is not finite");
-        bounds.extend(points[i]);
-    }
-    int longest = 0;
-    if (!bounds.isEmpty()) bounds.sizes().maxCoeff(&longest);
-
-    std::vector<TriangleBox> boxes(triangles.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, boxes.size(), 1024), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            const Triangle& t = triangles[i];
-            for (int v : t)
-                if (v < 0 || static_cast<std::size_t>(v) >= points.size())
-                    throw InputError("triangle " + std::to_string(i) + " names vertex " + std::to_string(v) +
-                                     " of a mesh with " + std::to_string(points.size()) + " vertices");
-            const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-            const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-            TriangleBox& box = boxes[i];
-            for (int k = 0; k < 3; ++k) {
-                const int axis = (longest + 3 + k - kSlabAxis) % 3;
-                const double from = bounds.min()[axis];
-                box.low[k] = rounded_down(low[axis] - from), box.high[k] = rounded_up(high[axis] - from);
-            }
-            box.triangle = has_area(a, b, c) ? static_cast<int>(i) : -1;
-        }
-    });
-    boxes.erase(
-        std::remove_if(boxes.begin(), boxes.end(), [](const TriangleBox& b) { return b.triangle < 0; }),
-        boxes.end());
-    return boxes;
+    for (std::size_t i = 0; i < triangles.size(); ++i)
+        for (const int v : triangles[i])
+            if (v < 0 || static_cast<std::size_t>(v) >= points.size())
+                throw InputError("triangle " + std::to_string(i) + " names vertex " + std::to_string(v) +
+                                 " of a mesh with " + std::to_string(points.size()) + " vertices");
 }
 
-struct Slab {
-    std::vector<TriangleBox> own;      // boxes that begin in this slab
-    std::vector<TriangleBox> earlier;  // boxes that begin in a slab before and reach into this one
+/// The boxes of the triangles with area, those that begin in the same slab next to each other.
+struct Slabs {
+    Slabs(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles);
+
+    std::size_t size() const { return earlier.size(); }
+    auto begin_of(std::size_t slab) { return boxes.begin() + first[slab]; }
+    auto end_of(std::size_t slab) { return boxes.begin() + first[slab + 1]; }
+
+    std::vector<TriangleBox> boxes;
+    std::vector<std::ptrdiff_t> first;              // of each slab, and the end
+    std::vector<std::vector<TriangleBox>> earlier;  // that begin in a slab before and reach into this one
 };
 
-std::vector<Slab> cut_into_slabs(const std::vector<TriangleBox>& boxes) {
-    constexpr std::size_t kEvery = 64;  // box of which one is a sample
+Slabs::Slabs(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
+    Box bounds;
+    for (const Vec3& p : points) bounds.extend(p);
+    int longest = 0;
+    if (!bounds.isEmpty()) bounds.sizes().maxCoeff(&longest);
+    const auto box_at = [&](std::size_t t) {
+        const Box box = box_of(points, triangles[t]);
+        TriangleBox result;
+        for (int k = 0; k < 3; ++k) {
+            const int axis = (longest + 3 + k - kSlabAxis) % 3;
+            const double from = bounds.min()[axis];
+            result.low[k] = rounded_down(box.min()[axis] - from);
+            result.high[k] = rounded_up(box.max()[axis] - from);
+        }
+        result.triangle = static_cast<int>(t);
+        return result;
+    };
+
+    constexpr std::size_t kEvery = 64;  // triangle of which one is a sample
     std::vector<float> sample;
-    for (std::size_t i = 0; i < boxes.size(); i += kEvery) sample.push_back(boxes[i].low[kSlabAxis]);
+    for (std::size_t t = 0; t < triangles.size(); t += kEvery) sample.push_back(box_at(t).low[kSlabAxis]);
     std::sort(sample.begin(), sample.end());
     const std::size_t wanted =
-        std::max(boxes.size() / kSlabSize + 1, std::min(boxes.size() / kLeastSlab, kFewest));
+        std::max(triangles.size() / kSlabSize + 1, std::min(triangles.size() / kLeastSlab, kFewest));
     std::vector<float> begins;  // of all slabs but the first
     for (std::size_t k = 1; k < wanted; ++k) begins.push_back(sample[k * sample.size() / wanted]);
 
-    const auto slab_of = [&](const TriangleBox& box) -> std::size_t {
-        return std::upper_bound(begins.begin(), begins.end(), box.low[kSlabAxis]) - begins.begin();
-    };
-    std::vector<std::size_t> count(begins.size() + 1);
-    for (const TriangleBox& box : boxes) ++count[slab_of(box)];
-    std::vector<Slab> slabs(count.size());
-    for (std::size_t k = 0; k < slabs.size(); ++k) slabs[k].own.reserve(count[k]);
-    for (const TriangleBox& box : boxes) {
-        std::size_t k = slab_of(box);
-        slabs[k].own.push_back(box);
-        for (; k < begins.size() && begins[k] <= box.high[kSlabAxis]; ++k)
-            slabs[k + 1].earlier.push_back(box);
-    }
-    return slabs;
+    // Which slab is found before there are boxes: to hold them twice would take the most memory of a frame.
+    constexpr std::size_t kGrain = 1024;
+    constexpr int kFlat = -1;
+    std::vector<int> slab(triangles.size());
+    std::vector<std::atomic<std::ptrdiff_t>> next(begins.size() + 1);
+    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
+        const auto& [i, j, k] = triangles[t];
+        slab[t] = kFlat;
+        if (!has_area(points[i], points[j], points[k])) return;
+        slab[t] = static_cast<int>(std::upper_bound(begins.begin(), begins.end(), box_at(t).low[kSlabAxis]) -
+                                   begins.begin());
+        next[slab[t]].fetch_add(1, std::memory_order_relaxed);
+    });
+    first.assign(1, 0);
+    for (auto& of_slab : next) first.push_back(first.back() + of_slab.exchange(first.back()));
+    boxes.resize(first.back());
+    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
+        if (slab[t] != kFlat) boxes[next[slab[t]].fetch_add(1, std::memory_order_relaxed)] = box_at(t);
+    });
+    earlier.resize(next.size());
+    for (std::size_t own = 0; own < size(); ++own)
+        for (auto box = begin_of(own); box != end_of(own); ++box)
+            for (std::size_t k = own; k < begins.size() && begins[k] <= box->high[kSlabAxis]; ++k)
+                earlier[k + 1].push_back(*box);
 }
 
 }  // namespace
@@ -184,17 +197,18 @@ std::vector<Slab> cut_into_slabs(const std::vector<TriangleBox>& boxes) {
 std::vector<std::pair<int, int>> self_intersections(const std::vector<Vec3>& points,
                                                     const std::vector<Triangle>& triangles) {
     // Two boxes that overlap do so in the slab where the second of them begins.
-    std::vector<Slab> slabs = cut_into_slabs(boxes_of(points, triangles));
+    check(points, triangles);
+    Slabs slabs(points, triangles);
     std::vector<Pairs> found(slabs.size());
     tbb::parallel_for(std::size_t(0), slabs.size(), [&](std::size_t k) {
-        Slab& slab = slabs[k];
+        auto& earlier = slabs.earlier[k];
         const auto test = [&](const TriangleBox& a, const TriangleBox& b) {
             if (cross(points, triangles[a.triangle], triangles[b.triangle]))
                 found[k].push_back(std::minmax(a.triangle, b.triangle));
         };
-        CGAL::box_self_intersection_d(slab.own.begin(), slab.own.end(), test, kScanBelow);
-        CGAL::box_intersection_d(slab.earlier.begin(), slab.earlier.end(), slab.own.begin(), slab.own.end(),
-                                 test, kScanBelow);
+        CGAL::box_self_intersection_d(slabs.begin_of(k), slabs.end_of(k), test, kScanBelow);
+        CGAL::box_intersection_d(earlier.begin(), earlier.end(), slabs.begin_of(k), slabs.end_of(k), test,
+                                 kScanBelow);
     });
 
     Pairs result;
