@@ -265,18 +265,20 @@ std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec
 
 namespace {
 
-/// The least squared distance that several threads find; infinite at first.
+/// The least squared distance that several threads find, rounded to a float; infinite at first. Rounding
+/// keeps the order, so that who finds it first changes nothing.
 class LeastSquare {
 public:
-    double get() const { return value_.load(std::memory_order_relaxed); }
-    void take(double candidate) {
-        double now = get();
+    float get() const { return value_.load(std::memory_order_relaxed); }
+    void take(double square) {
+        const auto candidate = static_cast<float>(square);
+        float now = get();
         while (candidate < now && !value_.compare_exchange_weak(now, candidate, std::memory_order_relaxed)) {
         }
     }
 
 private:
-    std::atomic<double> value_{std::numeric_limits<double>::infinity()};
+    std::atomic<float> value_{std::numeric_limits<float>::infinity()};
 };
 
 }  // namespace
@@ -321,15 +323,14 @@ std::vector<float> distances_within(double reach, const std::vector<Vec3>& point
         const Box box = box_of(points, triangles[t]);
         grid.for_each_in(Box(box.min() - around, box.max() + around), [&](std::size_t i) {
             if (!triangle) triangle.emplace(a, b, c);
-            const double limit = std::min(reach * reach, least[i].get());
+            const double limit = std::min<double>(reach * reach, least[i].get());
             least[i].take(triangle->squared_distance(grid[i], limit));
         });
     });
     std::vector<float> distances(grid.size());
     parallel_for_each(grid.size(), kCrossings, [&](std::size_t i) {
-        const double square = least[i].get();
-        distances[i] = square > reach * reach ? std::numeric_limits<float>::infinity()
-                                              : static_cast<float>(std::sqrt(square));
+        const float square = least[i].get();
+        distances[i] = square > reach * reach ? std::numeric_limits<float>::infinity() : std::sqrt(square);
     });
     return distances;
 }

@@ -62,7 +62,7 @@ std::optional<std::vector<int>> MeshDistances::measure(const std::vector<Vec3>& 
                     if (limit < 0.0) return;
                     const double d2 = triangle.squared_distance(points_[i], limit2);
                     if (d2 <= limit2)
-                        found.push_back({static_cast<int>(i), static_cast<float>(std::sqrt(d2))});
+                        found.push_back({static_cast<int>(i), std::sqrt(static_cast<float>(d2))});
                 });
             }
         };
