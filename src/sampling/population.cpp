@@ -169,7 +169,7 @@ Densifier::Densifier(Particles& particles, const Surface& surface, double detail
       most_(most),
       next_id_(next_id),
       probe_(surface.probe()),
-      grid_(2.0 * detail, particles.size() + particles.size() / 16) {}
+      grid_(particles.position, 2.0 * detail, particles.size() + particles.size() / 16) {}
 
 std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
     constexpr double kShrink = 0.6;
@@ -180,8 +180,7 @@ std::size_t Densifier::add(const std::vector<Shortage>& shortages) {
     if (shortages.empty() || before >= most_) return 0;
     first_of_call_ = static_cast<int>(before);
     widest_of_call_ = 0.0;
-    for (; in_grid_ < before; ++in_grid_)
-        grid_.insert(particles_.position[in_grid_], static_cast<int>(in_grid_));
+    grid_.take_new();
     std::vector<char> surrounded(before, 0);
     for (const Shortage& s : shortages) {
         const double wanted = std::max(s.spacing, min_spacing_);
@@ -239,9 +238,9 @@ int Densifier::add_or_nearest(const Vec3& place, double h) {
     const double distance = std::sqrt(least);
     if (taken) return kTaken;
     if (nearest >= 0 && distance < std::min(apart, kApart * particles_.spacing[nearest])) return nearest;
-    grid_.insert(p, static_cast<int>(in_grid_++));
     const double spacing = distance < apart ? distance / kApart : std::max(distance, h);
     particles_.add(p, n, std::max(std::min(spacing, max_spacing_), min_spacing_), next_id_++);
+    grid_.take_new();
     widest_of_call_ = std::max(widest_of_call_, particles_.spacing.back());
     return -1;
 }

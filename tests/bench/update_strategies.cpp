@@ -91,9 +91,8 @@ struct Packing {
 };
 
 Packing packing_of(const Particles& particles, double hexagonal) {
-    PointGrid grid(2.0 * hexagonal);
-    for (std::size_t i = 0; i < particles.size(); ++i)
-        grid.insert(particles.position[i], static_cast<int>(i));
+    PointGrid grid(particles.position, 2.0 * hexagonal);
+    grid.take_new();
     Packing result;
     for (std::size_t i = 0; i < particles.size(); ++i)
         grid.for_each_within(particles.position[i], 3.0 * hexagonal, [&](int j, double d2) {

@@ -9,37 +9,42 @@
 
 namespace isotrack {
 
-/// Points in the cells of an unbounded regular grid. Grows by insertion; visits in order of cells, then of
-/// insertion.
+/// The points of a list that grows, in the cells of an unbounded regular grid. Visits in order of cells, then
+/// of the list.
 class PointGrid {
 public:
+    /// Holds none of `points` at first. The list must outlive it; what is in the grid may not change.
     /// `cell_size`: world units, > 0; best near the usual query radius. `expected`: so many points at least.
-    explicit PointGrid(double cell_size, std::size_t expected = 0)
-        : cell_size_(cell_size), buckets_(kFewest) {
+    explicit PointGrid(const std::vector<Vec3>& points, double cell_size, std::size_t expected = 0)
+        : points_(points), cell_size_(cell_size), buckets_(kFewest) {
         entries_.reserve(expected);
     }
 
-    void insert(const Vec3& p, int index) {
-        if (entries_.size() == buckets_.size()) {
-            buckets_.assign(2 * buckets_.size(), {});
-            for (std::size_t e = 0; e < entries_.size(); ++e) append(static_cast<int>(e));
+    /// Takes the points that the list has got since.
+    void take_new() {
+        while (entries_.size() < points_.size()) {
+            if (entries_.size() == buckets_.size()) {
+                buckets_.assign(2 * buckets_.size(), {});
+                for (std::size_t e = 0; e < entries_.size(); ++e) append(static_cast<int>(e));
+            }
+            entries_.push_back({key(cell(points_[entries_.size()])), kNone});
+            append(static_cast<int>(entries_.size()) - 1);
         }
-        entries_.push_back({p, key(cell(p)), index, kNone});
-        append(static_cast<int>(entries_.size()) - 1);
     }
 
-    /// Calls visit(index, squared distance) for every point within `radius` of p.
+    /// Calls visit(index, squared distance) for every point within `radius` of p, which is less than 500
+    /// cells.
     template <typename Visit>
     void for_each_within(const Vec3& p, double radius, const Visit& visit) const {
         const Cell low = cell(p - Vec3::Constant(radius)), high = cell(p + Vec3::Constant(radius));
         for (std::int64_t x = low[0]; x <= high[0]; ++x)
             for (std::int64_t y = low[1]; y <= high[1]; ++y)
                 for (std::int64_t z = low[2]; z <= high[2]; ++z) {
-                    const std::uint64_t wanted = key({x, y, z});
+                    const std::uint32_t wanted = key({x, y, z});
                     for (int e = buckets_[bucket(wanted)].first; e != kNone; e = entries_[e].next) {
                         if (entries_[e].key != wanted) continue;
-                        const double d2 = (entries_[e].point - p).squaredNorm();
-                        if (d2 <= radius * radius) visit(entries_[e].index, d2);
+                        const double d2 = (points_[e] - p).squaredNorm();
+                        if (d2 <= radius * radius) visit(e, d2);
                     }
                 }
     }
@@ -49,9 +54,8 @@ private:
     static constexpr int kNone = -1;
     static constexpr std::size_t kFewest = 64;  // a power of two
     struct Entry {
-        Vec3 point;
-        std::uint64_t key;  // of its cell
-        int index, next;    // the next entry in its bucket
+        std::uint32_t key;  // of its cell
+        int next;           // the next entry in its bucket
     };
     struct Bucket {
         int first = kNone, last = kNone;
@@ -62,20 +66,21 @@ private:
         (of.first == kNone ? of.first : entries_[of.last].next) = e;
         of.last = e;
     }
-    std::size_t bucket(std::uint64_t key) const {
-        return (key * 0x9e3779b97f4a7c15u >> 32) & (buckets_.size() - 1);
+    std::size_t bucket(std::uint32_t key) const {
+        return (key * std::uint64_t{0x9e3779b97f4a7c15u} >> 32) & (buckets_.size() - 1);
     }
     Cell cell(const Vec3& p) const { return (p / cell_size_).array().floor().cast<std::int64_t>(); }
-    static std::uint64_t key(const Cell& c) {
-        // Distinct for cells less than 2^21 apart; farther ones share a bucket, where the distance tells them
+    static std::uint32_t key(const Cell& c) {
+        // Distinct for cells less than 2^10 apart; farther ones share a bucket, where the distance tells them
         // apart.
-        return ((static_cast<std::uint64_t>(c[0]) & 0x1fffff) << 42) |
-               ((static_cast<std::uint64_t>(c[1]) & 0x1fffff) << 21) |
-               (static_cast<std::uint64_t>(c[2]) & 0x1fffff);
+        return ((static_cast<std::uint32_t>(c[0]) & 0x7ff) << 21) |
+               ((static_cast<std::uint32_t>(c[1]) & 0x7ff) << 10) |
+               (static_cast<std::uint32_t>(c[2]) & 0x3ff);
     }
 
+    const std::vector<Vec3>& points_;
     double cell_size_;
-    std::vector<Entry> entries_;  // in the order of insertion
+    std::vector<Entry> entries_;  // of the points, in their order
     std::vector<Bucket> buckets_;
 };
 

@@ -72,7 +72,6 @@ private:
     Id& next_id_;
     std::unique_ptr<Surface::Probe> probe_;
     PointGrid grid_;
-    std::size_t in_grid_ = 0;
     int first_of_call_ = 0;        // of the particles added
     double widest_of_call_ = 0.0;  // of their spacings
 };
