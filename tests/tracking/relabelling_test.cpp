@@ -88,7 +88,8 @@ void take_away_and_reach_out(const Surface& surface, char label) {
         EXPECT_TRUE(uses(after));
         EXPECT_TRUE(topology_of(after).closed() && topology_of(after).manifold());
         EXPECT_EQ(topology_of(after).euler, topology_of(before).euler);
-        for (const FacetError& e : *carved.inspect(after).errors) EXPECT_LE(e.largest, tolerance);
+        const Inspection inspection_after = carved.inspect(after);
+        for (const FacetError& e : *inspection_after.errors) EXPECT_LE(e.largest, tolerance);
         ++reached;
     }
     EXPECT_GT(reached, 10);
