@@ -161,6 +161,15 @@ std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& 
     return result;
 }
 
+namespace {
+
+void take_back(const Blunting& change, std::vector<Vec3>& points, std::vector<Triangle>& triangles) {
+    for (std::size_t i = 0; i < change.triangle.size(); ++i) triangles[change.triangle[i]] = change.before[i];
+    if (change.vertex >= 0) points[change.vertex] = change.from;
+}
+
+}  // namespace
+
 Blunter::Blunter(std::vector<Vec3>& points, std::vector<Triangle>& triangles, std::vector<char> movable,
                  const Surface& surface, const std::vector<const CrossingGrid*>& reached, double tolerance,
                  std::optional<double> detail)
@@ -286,6 +295,13 @@ bool Blunter::undo_near(const std::vector<Vec3>& places, double distance) {
     return true;
 }
 
+std::pair<std::vector<Vec3>, std::vector<Triangle>> Blunter::before() const {
+    std::pair result(points_, triangles_);
+    for (auto change = changes_.rbegin(); change != changes_.rend(); ++change)
+        take_back(*change, result.first, result.second);
+    return result;
+}
+
 /// Takes back those that are marked, and later ones that concern the same triangles.
 void Blunter::undo(const std::vector<char>& marked) {
     std::vector<char> back(triangles_.size(), 0), taken = marked;
@@ -299,16 +315,14 @@ void Blunter::undo(const std::vector<char>& marked) {
     for (std::size_t c = changes_.size(); c-- > 0;) {
         if (!taken[c]) continue;
         const Blunting& change = changes_[c];
-        for (std::size_t i = 0; i < change.triangle.size(); ++i) {
-            triangles_[change.triangle[i]] = change.before[i];
-            searched_[change.triangle[i]] = 0;
-            unchecked_[change.triangle[i]] = 1;
+        take_back(change, points_, triangles_);
+        for (const int t : change.triangle) {
+            searched_[t] = 0;
+            unchecked_[t] = 1;
         }
         for (const Triangle& t : change.before)
             for (const int v : t) open_[v] = 1;
-        if (change.vertex < 0) continue;
-        points_[change.vertex] = change.from;
-        if (marked[c]) fixed_[change.vertex] = 1;
+        if (change.vertex >= 0 && marked[c]) fixed_[change.vertex] = 1;
     }
     for (std::size_t c = 0; boxes_ && c < changes_.size(); ++c)
         if (taken[c])

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "find_in_blocks.h"
+#include "room.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -189,7 +190,7 @@ PackedCrossings CellPoints::around(const std::vector<int>& some) {
     tbb::parallel_sort(wanted.begin(), wanted.end());
     wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
     std::vector<std::uint64_t> fresh;
-    fresh.reserve(wanted.size());
+    reserve_with_slack(fresh, wanted.size());
     std::set_difference(wanted.begin(), wanted.end(), given_.begin(), given_.end(),
                         std::back_inserter(fresh));
     wanted = std::vector<std::uint64_t>();  // there are many
@@ -228,10 +229,9 @@ PackedCrossings CellPoints::around(const std::vector<int>& some) {
         entries.end());
     entries.insert(entries.end(), others.begin(), others.end());
     if (given_.empty()) {
-        given_ = std::move(fresh);
+        given_ = std::move(fresh);  // later ones are few
     } else {
         const auto before = static_cast<std::ptrdiff_t>(given_.size());
-        given_.reserve(given_.size() + fresh.size());
         given_.insert(given_.end(), fresh.begin(), fresh.end());
         std::inplace_merge(given_.begin(), given_.begin() + before, given_.end());
     }

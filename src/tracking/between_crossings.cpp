@@ -140,16 +140,18 @@ PackedCrossings BetweenCrossings::points_near(const Changes& changes, const std:
                                               const MeshDistances& at_crossings) {
     // Crossings whose distances changed are looked at; and since normals turned at the corners of what came,
     // those along the triangles there, which may be at a fold now.
-    std::vector<char> is_near(crossings_.size(), 0);
-    for (const int c : changes.crossings) is_near[c] = 1;
-    const std::vector<char> turned = flags_at(changes.corners, vertices);
-    for (const Triangle& t : triangles)
-        if (turned[t[0]] || turned[t[1]] || turned[t[2]])
-            crossings_.for_each_in(box_along(t, vertices, tolerance_),
-                                   [&](std::size_t c) { is_near[c] = 1; });
     std::vector<int> near;
-    for (std::size_t c = 0; c < is_near.size(); ++c)
-        if (is_near[c]) near.push_back(static_cast<int>(c));
+    {
+        std::vector<char> is_near(crossings_.size(), 0);
+        for (const int c : changes.crossings) is_near[c] = 1;
+        const std::vector<char> turned = flags_at(changes.corners, vertices);
+        for (const Triangle& t : triangles)
+            if (turned[t[0]] || turned[t[1]] || turned[t[2]])
+                crossings_.for_each_in(box_along(t, vertices, tolerance_),
+                                       [&](std::size_t c) { is_near[c] = 1; });
+        for (std::size_t c = 0; c < is_near.size(); ++c)
+            if (is_near[c]) near.push_back(static_cast<int>(c));
+    }
     const CrossingGrid near_alone = crossings_.some(near);
     std::vector<char> beside(triangles.size(), 0), at(vertices.size(), 0);
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {

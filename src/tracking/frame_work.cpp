@@ -18,17 +18,16 @@ constexpr double kChangedShare = 0.96;  // of the tolerance, for the triangles t
 /// Makes sharp triangles blunter. The particles stay where they are: the next frame's triangles are others.
 void FrameWork::blunt() {
     const StageTimer timer(frame.seconds, "blunt");
+    mesh.on_surface = {};  // of no more use
     std::vector<const CrossingGrid*> reached;
     const auto take_what_is_looked_at = [&] {
         reached.assign(1, &*crossings);
         for (const CrossingGrid& between : inspector->between()) reached.push_back(&between);
     };
     take_what_is_looked_at();
-    std::vector<double> farthest_before;  // of each triangle
+    std::vector<float> farthest_before;  // of each triangle
     farthest_before.reserve(inspection.errors->size());
     for (const FacetError& error : *inspection.errors) farthest_before.push_back(error.largest);
-    const std::vector<Vec3> vertices_before = mesh.vertices;
-    const std::vector<Triangle> triangles_before = mesh.carved.triangles;
     Blunter blunter(mesh.vertices, mesh.carved.triangles,
                     lone_flags(mesh, lone_vertices(mesh, frame.particles)), surface, reached,
                     kChangedShare * limits.tolerance, limits.detail);
@@ -44,12 +43,14 @@ void FrameWork::blunt() {
         std::vector<Vec3> places;
         for (const Blunting& change : blunter.changes()) {
             double limit = kCertified * limits.tolerance;
-            for (const int t : change.triangle) limit = std::max(limit, farthest_before[t]);
+            for (const int t : change.triangle) limit = std::max<double>(limit, farthest_before[t]);
             for (const int t : change.triangle)
                 if (const FacetError& error = (*inspection.errors)[t]; error.largest > limit)
                     places.push_back(error.where.cast<double>());
         }
-        for (const auto& c : inspector->newly_missed(inspection, vertices_before, triangles_before))
+        if (inspection.missed.empty()) return places;
+        const auto& [vertices, triangles] = blunter.before();
+        for (const auto& c : inspector->newly_missed(inspection, vertices, triangles))
             places.push_back(c.point);
         return places;
     };

@@ -331,7 +331,6 @@ std::vector<Surface::Crossing> Inspector::newly_missed(const Inspection& now,
                                                        const std::vector<Triangle>& triangles) const {
     const CrossingGrid grid(now.missed, limits_.tolerance);
     std::vector<Surface::Crossing> result;
-    if (grid.empty()) return result;
     const auto distances = crossing_distances(vertices, triangles, grid, kCertified * limits_.tolerance);
     for (std::size_t c = 0; c < grid.size(); ++c)
         if (std::isfinite(distances[c])) result.push_back(grid[c]);

@@ -56,6 +56,8 @@ public:
 
     /// All that was changed and not taken back.
     const std::vector<Blunting>& changes() const { return changes_; }
+    /// Points and triangles as they were before these.
+    std::pair<std::vector<Vec3>, std::vector<Triangle>> before() const;
 
 private:
     bool pass();

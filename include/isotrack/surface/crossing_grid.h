@@ -83,7 +83,7 @@ private:
 
     std::vector<Entry> entries_;
     std::vector<Eigen::Vector3f> directions_;  // those of a lattice: few
-    std::vector<std::size_t> first_;           // of each column, and the end
+    std::vector<std::uint32_t> first_;         // of each column, and the end
     Vec3 origin_, size_;                       // of the box around them
     double spacing_, width_;  // of the columns: wider where there would be many more than crossings
     int count_[2] = {1, 1};
