@@ -213,10 +213,10 @@ PackedCrossings CellPoints::around(const std::vector<int>& some) {
                 for (; join != joins_.end() && join->cell == fresh[i]; ++join)
                     cell.join_corners(join->corners[0], join->corners[1]);
                 Entry& first = result.entries[i];
-                first.ways = 0;  // none
+                first.ways = PackedCrossings::kNoWay;
                 cell.for_each_mean([&](const Vec3& place, PackedCrossings::Ways ways) {
                     const Entry mean = result.packed(lattice_ * (low + place), ways);
-                    if (first.ways == 0)
+                    if (first.ways == PackedCrossings::kNoWay)
                         first = mean;
                     else
                         found.push_back(mean);
@@ -224,9 +224,9 @@ PackedCrossings CellPoints::around(const std::vector<int>& some) {
             }
         });
     auto& entries = result.entries;
-    entries.erase(
-        std::remove_if(entries.begin(), entries.end(), [](const Entry& entry) { return entry.ways == 0; }),
-        entries.end());
+    entries.erase(std::remove_if(entries.begin(), entries.end(),
+                                 [](const Entry& entry) { return entry.ways == PackedCrossings::kNoWay; }),
+                  entries.end());
     entries.insert(entries.end(), others.begin(), others.end());
     if (given_.empty()) {
         given_ = std::move(fresh);  // later ones are few

@@ -17,6 +17,7 @@ class PackedCrossings {
 public:
     /// Some directions: bit k for up along axis k, bit 3 + k for down.
     using Ways = std::uint32_t;
+    static constexpr Ways kNoWay = 0;
     struct Entry {
         Eigen::Vector3f offset;  // from the origin
         Ways ways;
@@ -36,15 +37,9 @@ public:
     Vec3 point(std::size_t i) const { return origin_ + entries[i].offset.cast<double>(); }
     Surface::Crossing operator[](std::size_t i) const { return {point(i), outward_[entries[i].ways]}; }
 
-    /// One that goes the middle between some ways, at least one; any of them where they cancel out.
+    /// One that goes the middle between some ways; any of them where they cancel out. With no way its
+    /// direction is zero.
     Entry packed(const Vec3& point, Ways ways) const { return {(point - origin_).cast<float>(), ways}; }
-    /// One that goes along an edge. That it stands for others is lost.
-    Entry packed(const Surface::Crossing& crossing) const {
-        const auto nearest = std::max_element(
-            along_.begin(), along_.end(),
-            [&](const auto& a, const auto& b) { return a.dot(crossing.outward) < b.dot(crossing.outward); });
-        return packed(crossing.point, 1u << (nearest - along_.begin()));
-    }
 
 private:
     Eigen::Vector3f middle_of(Ways ways) const {

@@ -116,7 +116,10 @@ PackedCrossings BetweenCrossings::points_beside(const std::vector<int>& doubtful
         const double within = flat ? kStandsForOnFlat : kStandsForWithin;
         const auto near = surface_.crossings_near(places, within * crossings_.spacing());
         result.entries.reserve(result.size() + near.size());
-        for (const Surface::Crossing& crossing : near) result.entries.push_back(result.packed(crossing));
+        // Where details are smaller than the tolerance there may be no triangle for a long way that faces as
+        // they do, and one that does stands for the crossing they are beside.
+        for (const Surface::Crossing& crossing : near)
+            result.entries.push_back(result.packed(crossing.point, PackedCrossings::kNoWay));
     }
     return result;
 }

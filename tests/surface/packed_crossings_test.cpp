@@ -32,7 +32,7 @@ TEST(PackedCrossings, AreThoseThatWerePacked) {
         const double side = i % 2 == 0 ? 1.0 : -1.0;
         const Vec3 outward = side * lattice.linear().col(i % 3).normalized();
         crossings.push_back({p, outward.cast<float>()});
-        list.entries.push_back(list.packed(crossings.back()));
+        list.entries.push_back(list.packed(p, 1u << (i % 3 + (i % 2 == 0 ? 0 : 3))));
     }
     ASSERT_EQ(list.size(), crossings.size());
     for (std::size_t i = 0; i < crossings.size(); ++i) {
@@ -55,7 +55,8 @@ TEST(PackedCrossings, GoTheMiddleBetweenTheirWays) {
     EXPECT_LT((outward(0b010000) + along(1)).norm(), 1e-6);
     EXPECT_LT((outward(0b100011) - (along(0) + along(1) - along(2)).normalized()).norm(), 1e-6);
     EXPECT_LT((outward(0b010011) - along(0)).norm(), 1e-6);  // up and down axis 1
-    const Vec3 one_of_two = outward(0b001001);               // up and down axis 0 alone
+    EXPECT_EQ(outward(PackedCrossings::kNoWay), Vec3::Zero());
+    const Vec3 one_of_two = outward(0b001001);  // up and down axis 0 alone
     EXPECT_LT(std::min((one_of_two - along(0)).norm(), (one_of_two + along(0)).norm()), 1e-6);
 }
 

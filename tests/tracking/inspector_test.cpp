@@ -7,6 +7,8 @@
 #include <set>
 #include <vector>
 
+#include "isotrack/surface/level_set.h"
+#include "isotrack/surface/rasterise.h"
 #include "isotrack/surface/shapes.h"
 #include "support/carved.h"
 #include "surface/cell_points.h"
@@ -151,6 +153,35 @@ TEST(Inspector, KnowsWhatChangedSinceItLookedBetweenCrossings) {
         EXPECT_EQ(found_by(kept), found_by(anew)) << v;
     }
     EXPECT_GT(found_by(kept).size(), at_first + 20);
+}
+
+TEST(Inspector, LetsAnyTriangleStandForWhatACrossingStandsFor) {
+    constexpr double kTolerance = 0.1, kCutoff = 3.0 * kTolerance;
+    const LevelSet level_set(
+        rasterise(*shapes::box({0.01, 0.02, 0.03}, {1.0, 0.7, 0.45}, kResolution), kResolution));
+    const CrossingGrid crossings(level_set, 2.0 * kResolution);
+    ASSERT_TRUE(crossings.thinned_out(level_set));
+    FrameMesh mesh = Carved(level_set, kTolerance).mesh();
+    for (Vec3& v : mesh.vertices) v *= 0.9;  // which brings some too far off, and others nearly
+    MeshDistances distances(crossings, kCutoff);
+    distances.measure(mesh.vertices, mesh.carved.triangles, {});
+    BetweenCrossings between(level_set, crossings, {}, kTolerance);
+    const CrossingGrid points(
+        Surface::CrossingSequence(between.points(mesh.vertices, mesh.carved.triangles, distances)),
+        kResolution);
+    ASSERT_GT(points.size(), 50u);
+    const auto all = level_set.crossings();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        EXPECT_EQ(points[i].outward, Eigen::Vector3f::Zero());
+        EXPECT_TRUE(std::any_of(all.begin(), all.end(), [&](const Surface::Crossing& crossing) {
+            return (crossing.point - points[i].point).norm() < 1e-6;
+        }));
+    }
+    std::vector<Triangle> turned = mesh.carved.triangles;
+    for (Triangle& t : turned) std::swap(t[0], t[1]);
+    const auto as_they_are = crossing_distances(mesh.vertices, mesh.carved.triangles, points, kCutoff),
+               turned_over = crossing_distances(mesh.vertices, turned, points, kCutoff);
+    for (std::size_t i = 0; i < points.size(); ++i) EXPECT_NEAR(as_they_are[i], turned_over[i], 1e-6);
 }
 
 TEST(Facets, AreTheSameByTheirCornersWhereTheyHaveNoKey) {
