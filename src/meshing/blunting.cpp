@@ -4,11 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "isotrack/meshing/certify.h"
 #include "meshing/crossing_triangles.h"
 #include "meshing/sharpness.h"
-#include "meshing/stands_for.h"
-#include "meshing/triangle_box.h"
 #include "parallel_for_each.h"
 #include "sampling/compact.h"
 #include "surface/thread_probes.h"
@@ -98,60 +95,13 @@ double BluntedMesh::longest_edge_of(int triangle) const {
     return std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
 }
 
-namespace {
-
-/// The least of some triangles.
-double facing_of(const std::vector<Places>& some, Surface::Probe& probe) {
-    double least = 1.0;
-    for (const auto& [a, b, c] : some) least = std::min(least, facing(a, b, c, probe));
-    return least;
-}
-
-}  // namespace
-
-Replaced BluntedMesh::replaced(std::vector<int> numbers, Surface::Probe& probe) const {
-    Replaced result;
-    std::vector<Places> old;
+Replaced BluntedMesh::replaced(const std::vector<int>& numbers, Surface::Probe& probe) const {
     std::vector<int> beside;
-    for (const int number : numbers) {
-        const Triangle& t = triangles[number];
-        old.push_back(places_of(t));
-        const auto& [a, b, c] = old.back();
-        result.triangles.emplace_back(a, b, c);
-        result.box.extend(box_of(points, t));
-        for (const int v : t)
+    for (const int number : numbers)
+        for (const int v : triangles[number])
             for (int e = corners.first[v]; e < corners.first[v + 1]; ++e)
                 beside.push_back(corners.corner[e] / 3);
-    }
-    result.facing = facing_of(old, probe);
-    std::sort(numbers.begin(), numbers.end());
-    std::sort(beside.begin(), beside.end());
-    beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
-    for (const int number : beside) {
-        if (std::binary_search(numbers.begin(), numbers.end(), number)) continue;
-        const auto [a, b, c] = places_of(triangles[number]);
-        result.beside.emplace_back(a, b, c);
-    }
-    return result;
-}
-
-bool BluntedMesh::reach_what(const Replaced& before, const std::vector<Places>& candidates) const {
-    std::vector<FacingTriangle> after;
-    for (const auto& [a, b, c] : candidates) after.emplace_back(a, b, c);
-    return std::all_of(reached.begin(), reached.end(), [&](const CrossingGrid* points_there) {
-        return stand_for_same(*points_there, before.triangles, before.box, after, before.beside, tolerance);
-    });
-}
-
-bool BluntedMesh::may_have(const std::vector<Places>& candidates, const Replaced& before,
-                           Surface::Probe& probe) const {
-    if (!(facing_of(candidates, probe) > std::min(kFacing, before.facing))) return false;
-    const auto passes = [&](const Places& t) {
-        const auto& [a, b, c] = t;
-        const TriangleError error = certified_error(a, b, c, probe, detail, 0.5 * tolerance);
-        return error.largest <= tolerance && error.turned_deg <= kMostTurnedDeg;
-    };
-    return std::all_of(candidates.begin(), candidates.end(), passes) && reach_what(before, candidates);
+    return ReplaceableMesh::replaced(numbers, std::move(beside), probe);
 }
 
 std::vector<Triangle> BluntedMesh::near(const Box& box, const std::vector<int>& except) const {
@@ -210,14 +160,10 @@ bool Blunter::pass() {
     open_.assign(points_.size(), 0);
     if (sharp.empty()) return false;
     std::sort(sharp.begin(), sharp.end());
-    BluntedMesh mesh{points_,
-                     triangles_,
+    BluntedMesh mesh{{points_, triangles_, tolerance_, detail_, reached_},
                      Corners(points_.size(), triangles_),
                      movable_,
                      fixed_,
-                     tolerance_,
-                     detail_,
-                     reached_,
                      lost_,
                      [this]() -> const TriangleBoxes& {
                          std::call_once(made_boxes_, [this] {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <functional>
 #include <optional>
 #include <set>
@@ -10,34 +9,18 @@
 #include <vector>
 
 #include "isotrack/meshing/blunting.h"
-#include "isotrack/meshing/certify.h"
 #include "meshing/corners.h"
+#include "meshing/replacing.h"
 #include "meshing/sharpness.h"
 #include "meshing/triangle_boxes.h"
 
 namespace isotrack {
 
-/// What a change would replace.
-struct Replaced {
-    double facing;  ///< The least cosine between normals of its triangles and the surface's.
-    std::vector<FacingTriangle> triangles;
-    std::vector<FacingTriangle> beside;  ///< With a vertex in common when the pass began.
-    Box box;
-};
-
-/// A triangle by where its corners are.
-using Places = std::array<Vec3, 3>;
-
-/// A mesh in the course of a pass. Threads that look for changes share it, each with a probe of its own.
-struct BluntedMesh {
-    const std::vector<Vec3>& points;
-    const std::vector<Triangle>& triangles;
+/// A mesh in the course of a pass.
+struct BluntedMesh : ReplaceableMesh {
     const Corners corners;  ///< Of the start; still right around what is untouched.
     const std::vector<char>& movable;
     const std::vector<char>& fixed;  ///< Per vertex: a move of it was taken back.
-    double tolerance;
-    double detail;  ///< What is smaller need not be looked at.
-    const std::vector<const CrossingGrid*>& reached;
     const std::set<std::pair<int, int>>&
         lost;  ///< Edges, ascending, that may come back and are not to be made anew.
     std::function<const TriangleBoxes&()> boxes;  ///< Made when they are asked for: few are.
@@ -45,17 +28,10 @@ struct BluntedMesh {
 
     double sharpness_of(const Triangle& t) const;
     double longest_edge_of(int triangle) const;
-    Places places_of(const Triangle& t) const { return {points[t[0]], points[t[1]], points[t[2]]}; }
-    Replaced replaced(std::vector<int> numbers, Surface::Probe& probe) const;
-    /// Whether all these triangles face the way the surface does, or no worse than those they stand for, are
-    /// within the tolerance of it, and with those beside them keep what those stand for of what is reached
-    /// within the tolerance.
-    bool may_have(const std::vector<Places>& candidates, const Replaced& before, Surface::Probe& probe) const;
+    /// Beside them is what was so when the pass began.
+    Replaced replaced(const std::vector<int>& numbers, Surface::Probe& probe) const;
     /// The triangles but `except` (ascending) whose boxes meet this one.
     std::vector<Triangle> near(const Box& box, const std::vector<int>& except) const;
-
-private:
-    bool reach_what(const Replaced& before, const std::vector<Places>& candidates) const;
 };
 
 /// A change that may be made while the vertices it is about are untouched.

@@ -1,0 +1,59 @@
+#include "meshing/replacing.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "meshing/stands_for.h"
+#include "meshing/triangle_box.h"
+
+namespace isotrack {
+namespace {
+
+/// The least of some triangles.
+double facing_of(const std::vector<Places>& some, Surface::Probe& probe) {
+    double least = 1.0;
+    for (const auto& [a, b, c] : some) least = std::min(least, facing(a, b, c, probe));
+    return least;
+}
+
+}  // namespace
+
+Replaced ReplaceableMesh::replaced(std::vector<int> numbers, std::vector<int> beside,
+                                   Surface::Probe& probe) const {
+    Replaced result;
+    std::vector<Places> old;
+    for (const int number : numbers) {
+        old.push_back(places_of(triangles[number]));
+        const auto& [a, b, c] = old.back();
+        result.triangles.emplace_back(a, b, c);
+        result.box.extend(box_of(points, triangles[number]));
+    }
+    result.facing = facing_of(old, probe);
+    std::sort(numbers.begin(), numbers.end());
+    std::sort(beside.begin(), beside.end());
+    beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
+    for (const int number : beside) {
+        if (std::binary_search(numbers.begin(), numbers.end(), number)) continue;
+        const auto [a, b, c] = places_of(triangles[number]);
+        result.beside.emplace_back(a, b, c);
+    }
+    return result;
+}
+
+bool ReplaceableMesh::may_have(const std::vector<Places>& candidates, const Replaced& before,
+                               Surface::Probe& probe) const {
+    if (!(facing_of(candidates, probe) > std::min(kFacing, before.facing))) return false;
+    const auto passes = [&](const Places& t) {
+        const auto& [a, b, c] = t;
+        const TriangleError error = certified_error(a, b, c, probe, detail, 0.5 * tolerance);
+        return error.largest <= tolerance && error.turned_deg <= kMostTurnedDeg;
+    };
+    if (!std::all_of(candidates.begin(), candidates.end(), passes)) return false;
+    std::vector<FacingTriangle> after;
+    for (const auto& [a, b, c] : candidates) after.emplace_back(a, b, c);
+    return std::all_of(reached.begin(), reached.end(), [&](const CrossingGrid* points_there) {
+        return stand_for_same(*points_there, before.triangles, before.box, after, before.beside, tolerance);
+    });
+}
+
+}  // namespace isotrack
