@@ -11,7 +11,6 @@ namespace isotrack {
 namespace {
 
 constexpr int kBluntRounds = 3, kBluntPasses = 12;
-constexpr double kChangedShare = 0.96;  // of the tolerance, for the triangles that change
 
 }  // namespace
 
@@ -19,12 +18,7 @@ constexpr double kChangedShare = 0.96;  // of the tolerance, for the triangles t
 void FrameWork::blunt() {
     const StageTimer timer(frame.seconds, "blunt");
     mesh.on_surface = {};  // of no more use
-    std::vector<const CrossingGrid*> reached;
-    const auto take_what_is_looked_at = [&] {
-        reached.assign(1, &*crossings);
-        for (const CrossingGrid& between : inspector->between()) reached.push_back(&between);
-    };
-    take_what_is_looked_at();
+    std::vector<const CrossingGrid*> reached = inspector->reached();
     std::vector<float> farthest_before;  // of each triangle
     farthest_before.reserve(inspection.errors->size());
     for (const FacetError& error : *inspection.errors) farthest_before.push_back(error.largest);
@@ -38,7 +32,7 @@ void FrameWork::blunt() {
         inspection = inspector->inspect_both_ways(mesh);
         if (look_between) {
             inspector->look_between(mesh, inspection);
-            take_what_is_looked_at();
+            reached = inspector->reached();
         }
         std::vector<Vec3> places;
         for (const Blunting& change : blunter.changes()) {

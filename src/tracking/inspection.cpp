@@ -337,6 +337,12 @@ std::vector<Surface::Crossing> Inspector::newly_missed(const Inspection& now,
     return result;
 }
 
+std::vector<const CrossingGrid*> Inspector::reached() const {
+    std::vector<const CrossingGrid*> result(1, &crossings_);
+    for (const CrossingGrid& points : between_) result.push_back(&points);
+    return result;
+}
+
 void Inspector::forget_distances() {
     for (MeshDistances& distances : distances_) distances.forget();
     measured_ = false;

@@ -88,8 +88,8 @@ public:
     /// As `inspect` finds them, of triangles of three corners each, from the corner with the least number on:
     /// their last digits depend on the order.
     std::vector<FacetError> errors_of(const std::vector<Vec3>& corners) const;
-    /// The points between crossings found so far.
-    const std::deque<CrossingGrid>& between() const { return between_; }
+    /// The crossings, and the points between them found so far.
+    std::vector<const CrossingGrid*> reached() const;
     /// Whether some crossings stand for all: the tolerance is several resolutions.
     bool thins_out() const { return crossings_.thinned_out(surface_); }
     /// What looking at the topology needs of the surface alone; done then if not before.

@@ -31,6 +31,7 @@
 #include "tracking/frame_work.h"
 #include "tracking/inspection.h"
 #include "tracking/last_mesh.h"
+#include "tracking/light_patches.h"
 #include "tracking/lost_drops.h"
 #include "tracking/mesh_trials.h"
 #include "tracking/patch_batches.h"
@@ -578,6 +579,7 @@ void Tracker::Impl::Making::patch() {
     }
     work_.inspector->look_off_surface(work_.mesh, work_.inspection);
     if (!fails_much) patch_failing(of_mesh, thickness, work_.surface);
+    lighten_patches(of_mesh, work_.surface, work_.limits);
 }
 
 /// Brings the particles to the surface, and their number and spacing to what it wants.

@@ -128,9 +128,9 @@ TEST(Inspector, KnowsWhatChangedSinceItLookedBetweenCrossings) {
     };
     const auto found_by = [](const Inspector& inspector) {
         std::set<std::array<double, 3>> result;
-        for (const CrossingGrid& points : inspector.between())
-            for (std::size_t i = 0; i < points.size(); ++i) {
-                const Vec3 p = to_float_precision(points[i].point);
+        for (const CrossingGrid* points : inspector.reached())
+            for (std::size_t i = 0; i < points->size(); ++i) {
+                const Vec3 p = to_float_precision((*points)[i].point);
                 result.insert({p.x(), p.y(), p.z()});
             }
         return result;

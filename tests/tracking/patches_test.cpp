@@ -15,6 +15,7 @@
 #include "isotrack/surface/shapes.h"
 #include "support/carved.h"
 #include "support/lattice_grid.h"
+#include "tracking/light_patches.h"
 #include "tracking/patch_batches.h"
 
 namespace isotrack {
@@ -66,6 +67,22 @@ void expect_patched(const openvdb::FloatGrid::Ptr& grid, const Vec3& place, doub
     EXPECT_EQ(mesh.carved.inside_cell.size(), mesh.carved.triangles.size());
     // Now there is nothing to patch.
     EXPECT_EQ(patch_topology(now.trials, thickness, surface), 0u);
+
+    const FrameMesh patched = mesh;
+    const std::size_t failing = now.trials.failing_places().size();
+    const std::size_t went = lighten_patches(now.trials, surface, carved.limits);
+    EXPECT_GT(went, 10u);
+    EXPECT_EQ(mesh.vertices.size(), patched.vertices.size() - went);
+    const auto on_particles = [](const FrameMesh& of) {
+        return std::count_if(of.carved.particle.begin(), of.carved.particle.end(),
+                             [](int p) { return p >= 0; });
+    };
+    EXPECT_EQ(on_particles(mesh), on_particles(patched));
+    expect_sound(mesh);
+    EXPECT_EQ(topology_of(mesh).euler, *euler);
+    EXPECT_EQ(topology_of(mesh).components, components->size());
+    EXPECT_LE(now.trials.failing_places().size(), failing);
+    EXPECT_EQ(now.inspection.errors->size(), mesh.carved.triangles.size());
 }
 
 TEST(Patches, FillAHoleInAThinSheet) {

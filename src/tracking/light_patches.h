@@ -1,0 +1,16 @@
+// Patches with no more vertices than they need.
+#pragma once
+
+#include <cstddef>
+
+#include "isotrack/sampling/sizing.h"
+#include "isotrack/surface/surface.h"
+#include "tracking/mesh_trials.h"
+
+namespace isotrack {
+
+/// Takes vertices that stand on no particle out of a mesh, as far as it goes on reaching all it reached and
+/// triangles that change are within the tolerance. Returns how many went.
+std::size_t lighten_patches(MeshTrials& trials, const Surface& surface, const SizingLimits& limits);
+
+}  // namespace isotrack
