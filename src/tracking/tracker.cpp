@@ -566,6 +566,8 @@ void Tracker::Impl::Making::certify() {
 }
 
 void Tracker::Impl::Making::patch() {
+    fitted_ = {};  // of no more use
+    densifier_.reset();
     if (!guided() || options().min_edge) return;
     const StageTimer timer(work_.frame.seconds, "certify");
     const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
