@@ -330,7 +330,8 @@ std::vector<float> distances_within(double reach, const std::vector<Vec3>& point
     std::vector<float> distances(grid.size());
     parallel_for_each(grid.size(), kCrossings, [&](std::size_t i) {
         const float square = least[i].get();
-        distances[i] = square > reach * reach ? std::numeric_limits<float>::infinity() : std::sqrt(square);
+        distances[i] = square > static_cast<float>(reach * reach) ? std::numeric_limits<float>::infinity()
+                                                                  : std::sqrt(square);
     });
     return distances;
 }

@@ -1,13 +1,18 @@
 #include "meshing/lightening.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <utility>
 
+#include "component_boxes.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "meshing/replacing.h"
 #include "meshing/sharpness.h"
+#include "meshing/triangle_bins.h"
 #include "meshing/triangle_boxes.h"
 
 namespace isotrack {
@@ -15,21 +20,41 @@ namespace {
 
 class Lightening {
 public:
-    Lightening(const std::vector<Vec3>& points, std::vector<Triangle>& triangles, const Surface& surface,
+    Lightening(const std::vector<Vec3>& points, std::vector<Triangle>& triangles,
+               const std::vector<char>& may_go, const Surface& surface,
                const std::vector<const CrossingGrid*>& reached, double tolerance, double detail)
         : points_(points),
           triangles_(triangles),
           mesh_{points, triangles, tolerance, detail, reached},
           probe_(surface.probe()),
-          boxes_(points, triangles),
           around_(points.size()),
+          refused_(points.size(), 0.0f),
           result_{std::vector<char>(triangles.size(), 0), std::vector<char>(triangles.size(), 0)} {
+        // All that comes is between corners of triangles with a vertex that may go: what it may cross is near
+        // these.
+        std::vector<char> at_patch(points.size(), 0);
+        std::vector<Triangle> patches;
+        for (const Triangle& t : triangles) {
+            if (!may_go[t[0]] && !may_go[t[1]] && !may_go[t[2]]) continue;
+            patches.push_back(t);
+            for (const int v : t) at_patch[v] = 1;
+        }
         for (std::size_t t = 0; t < triangles.size(); ++t)
-            for (const int v : triangles[t]) around_[v].push_back(static_cast<int>(t));
+            for (const int v : triangles[t])
+                if (at_patch[v]) around_[v].push_back(static_cast<int>(t));
+        const TriangleBins bins(points, triangles, surface.resolution());
+        std::vector<int> near;
+        for (const Box& box : component_boxes<3>(points, patches)) {
+            const std::vector<int> some = bins.meeting(box);
+            near.insert(near.end(), some.begin(), some.end());
+        }
+        std::sort(near.begin(), near.end());
+        near.erase(std::unique(near.begin(), near.end()), near.end());
+        boxes_.emplace(points, triangles, near);
     }
 
-    /// Draws some vertices along edges no longer than `longest`, until none can be; those are taken out of
-    /// the list.
+    /// Draws some vertices along edges no longer than `longest`, again where a neighbour was drawn meanwhile.
+    /// Those that went are taken out of the list.
     void run(std::vector<int>& some, double longest) {
         std::vector<char> open(points_.size(), 0);
         for (const int v : some) open[v] = 1;
@@ -39,8 +64,14 @@ public:
                 if (!open[v]) continue;
                 open[v] = 0;
                 const std::vector<int> ring = neighbours(v);
-                if (!draw(v, ring, longest)) continue;
-                for (const int w : ring) open[w] = 1;
+                if (!draw(v, ring, longest)) {
+                    refused_[v] = static_cast<float>(longest);
+                    continue;
+                }
+                for (const int w : ring) {
+                    open[w] = 1;
+                    refused_[w] = 0.0f;
+                }
                 again = true;
             }
             some.erase(std::remove_if(some.begin(), some.end(), [&](int v) { return around_[v].empty(); }),
@@ -76,17 +107,28 @@ private:
             if (!has(triangles_[t], w)) result.push_back(drawn(triangles_[t], v, w));
         return result;
     }
-    /// Whether a vertex and w, in its ring, have no neighbours in common but beyond the triangles of their
-    /// edge, and more than those of a tetrahedron [Dey et al. 1999].
+    /// Whether a vertex and w, in its ring, have no neighbours in common but those beyond the two triangles
+    /// of their edge, and there is more than a tetrahedron [Dey et al. 1999, "Topology preserving edge
+    /// contraction"].
     bool keeps_topology(int w, const std::vector<int>& ring) const {
         const std::vector<int> other = neighbours(w);
         std::vector<int> common;
         std::set_intersection(ring.begin(), ring.end(), other.begin(), other.end(),
                               std::back_inserter(common));
-        return common.size() == 2 && ring.size() > 3 && other.size() > 3;
+        return common.size() == 2 && (ring.size() > 3 || other.size() > 3);
     }
     double sharpness_of(const Triangle& t) const {
         return sharpness(points_[t[0]], points_[t[1]], points_[t[2]]);
+    }
+    /// The largest; infinite where one has no area.
+    double sharpest_of(const std::vector<Triangle>& some) const {
+        double result = 0.0;
+        for (const Triangle& t : some) {
+            const double sharp = sharpness_of(t);
+            if (!std::isfinite(sharp)) return std::numeric_limits<double>::infinity();
+            result = std::max(result, sharp);
+        }
+        return result;
     }
 
     bool draw(int v, const std::vector<int>& ring, double longest) {
@@ -94,10 +136,10 @@ private:
         for (const int t : around_[v]) most = std::max(most, sharpness_of(triangles_[t]));
         std::vector<Target> targets;
         for (const int w : ring) {
-            if ((points_[w] - points_[v]).norm() > longest || !keeps_topology(w, ring)) continue;
-            double sharpest = 0.0;
-            for (const Triangle& t : coming(v, w)) sharpest = std::max(sharpest, sharpness_of(t));
-            if (sharpest <= most) targets.push_back({sharpest, w});
+            const double length = (points_[w] - points_[v]).norm();
+            if (length <= refused_[v] || length > longest || !keeps_topology(w, ring)) continue;
+            const double sharpest = sharpest_of(coming(v, w));
+            if (std::isfinite(sharpest) && sharpest <= most) targets.push_back({sharpest, w});
         }
         if (targets.empty()) return false;
         std::sort(targets.begin(), targets.end(), [](const Target& a, const Target& b) {
@@ -121,7 +163,7 @@ private:
         for (const Triangle& t : comes)
             for (const int w : t) box.extend(points_[w]);
         std::vector<Triangle> near;
-        for (const int t : boxes_.meeting(box))
+        for (const int t : boxes_->meeting(box))
             if (!result_.gone[t] && !has(triangles_[t], v)) near.push_back(triangles_[t]);
         return any_cross(points_, comes, near);
     }
@@ -135,7 +177,7 @@ private:
                 triangles_[t] = drawn(triangles_[t], v, w);
                 result_.changed[t] = 1;
                 around_[w].push_back(t);
-                boxes_.note(t);
+                boxes_->note(t);
             }
         }
         around_[v].clear();
@@ -145,8 +187,9 @@ private:
     std::vector<Triangle>& triangles_;
     const ReplaceableMesh mesh_;
     const std::unique_ptr<Surface::Probe> probe_;
-    TriangleBoxes boxes_;
-    std::vector<std::vector<int>> around_;  // each vertex: the triangles that are left
+    std::optional<TriangleBoxes> boxes_;
+    std::vector<std::vector<int>> around_;  // each vertex of a patch: the triangles that are left
+    std::vector<float> refused_;            // along edges up to this length, since a neighbour was drawn
     Lightened result_;
 };
 
@@ -156,7 +199,7 @@ Lightened lighten(const std::vector<Vec3>& points, std::vector<Triangle>& triang
                   const std::vector<char>& may_go, const Surface& surface,
                   const std::vector<const CrossingGrid*>& reached, double tolerance, double detail) {
     constexpr double kFirst = 1.0, kMost = 64.0;  // resolutions: length of the edges
-    Lightening lightening(points, triangles, surface, reached, tolerance, detail);
+    Lightening lightening(points, triangles, may_go, surface, reached, tolerance, detail);
     std::vector<int> some;
     for (std::size_t v = 0; v < may_go.size(); ++v)
         if (may_go[v]) some.push_back(static_cast<int>(v));

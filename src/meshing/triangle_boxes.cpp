@@ -6,6 +6,7 @@
 #include <boost/geometry/geometries/point.hpp>
 #include <boost/geometry/index/rtree.hpp>
 #include <iterator>
+#include <numeric>
 #include <utility>
 
 #include "meshing/triangle_box.h"
@@ -22,6 +23,12 @@ TreeBox to_tree(const Box& box) {
     return {{box.min().x(), box.min().y(), box.min().z()}, {box.max().x(), box.max().y(), box.max().z()}};
 }
 
+std::vector<int> numbers_below(std::size_t count) {
+    std::vector<int> result(count);
+    std::iota(result.begin(), result.end(), 0);
+    return result;
+}
+
 }  // namespace
 
 /// Boxes of what a triangle was stay in the tree: it is found more often than needed, and looked at as it is.
@@ -33,14 +40,17 @@ struct TriangleBoxes::Impl {
     Box box(int triangle) const { return box_of(points, triangles[triangle]); }
 };
 
-TriangleBoxes::TriangleBoxes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles)
+TriangleBoxes::TriangleBoxes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                             const std::vector<int>& some)
     : impl_(new Impl{points, triangles, Tree()}) {
     std::vector<Entry> entries;
-    entries.reserve(triangles.size());
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        entries.emplace_back(to_tree(impl_->box(static_cast<int>(t))), static_cast<int>(t));
+    entries.reserve(some.size());
+    for (const int t : some) entries.emplace_back(to_tree(impl_->box(t)), t);
     impl_->tree = Tree(entries.begin(), entries.end());
 }
+
+TriangleBoxes::TriangleBoxes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles)
+    : TriangleBoxes(points, triangles, numbers_below(triangles.size())) {}
 
 TriangleBoxes::~TriangleBoxes() = default;
 

@@ -11,7 +11,11 @@ namespace isotrack {
 /// Triangles by their bounding boxes. Threads may share `meeting`, but not `note`.
 class TriangleBoxes {
 public:
-    /// Both must outlive it; after a triangle or a vertex of it changed `note` must be told.
+    /// Some of a mesh. Points and triangles must outlive it; after one of these, or a vertex of it, changed
+    /// `note` must be told.
+    TriangleBoxes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                  const std::vector<int>& some);
+    /// All.
     TriangleBoxes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles);
     ~TriangleBoxes();
 

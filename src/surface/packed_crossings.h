@@ -1,7 +1,6 @@
 // A list of crossings in less memory.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -11,8 +10,8 @@
 
 namespace isotrack {
 
-/// In 16 bytes each, less than half: their directions are those of the edges of a lattice, or middles of some
-/// of these, and points are floats from a place on.
+/// In 16 bytes each, less than half: their directions are those of the edges of a lattice, middles of some of
+/// these, or none, and points are floats from a place on.
 class PackedCrossings {
 public:
     /// Some directions: bit k for up along axis k, bit 3 + k for down.

@@ -11,7 +11,7 @@ namespace isotrack {
 
 constexpr double kSuspect = 0.6;     // of the tolerance: above it a triangle's largest error is searched for
 constexpr double kCertified = 0.97;  // of the tolerance: samples at other places find it kept, too
-constexpr double kChangedShare = 0.96;  // of the tolerance, for triangles that change when all is kept
+constexpr double kChangedShare = 0.96;  // of the tolerance: for triangles that come for others that keep it
 // The mean slope of a level set made of a mesh is 0.976: values over it still keep the tolerance. Where the
 // slope is less values are held to less.
 constexpr double kFullSlope = 0.975;

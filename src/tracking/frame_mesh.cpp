@@ -33,9 +33,8 @@ bool is_flipped(const CarvedSurface& carved, std::size_t triangle, const Tetrahe
     });
 }
 
-FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out) {
-    FrameMesh result = mesh;
-    CarvedSurface& carved = result.carved;
+FrameMesh without(FrameMesh mesh, const std::vector<char>& left_out) {
+    CarvedSurface& carved = mesh.carved;
     std::vector<char> keep;
     for (const char flag : left_out) keep.push_back(!flag);
     compact(carved.triangles, keep);
@@ -44,16 +43,16 @@ FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out) {
     keep.assign(mesh.vertices.size(), 0);
     for (const Triangle& t : carved.triangles)
         for (const int v : t) keep[v] = 1;
-    compact(result.vertices, keep);
-    compact(result.on_surface, keep);
+    compact(mesh.vertices, keep);
+    compact(mesh.on_surface, keep);
     compact(carved.particle, keep);
     carved.midpoints.clear();
     for (std::size_t v = 0; v < carved.particle.size(); ++v)
-        if (carved.particle[v] < 0) carved.midpoints.push_back(result.on_surface[v]);
+        if (carved.particle[v] < 0) carved.midpoints.push_back(mesh.on_surface[v]);
     const std::vector<int> number = numbers_after(keep);
     for (Triangle& t : carved.triangles)
         for (int& v : t) v = number[v];
-    return result;
+    return mesh;
 }
 
 void append(FrameMesh& mesh, const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {

@@ -28,7 +28,7 @@ std::vector<char> lone_flags(const FrameMesh& mesh, const std::vector<int>& lone
 bool is_flipped(const CarvedSurface& carved, std::size_t triangle, const Tetrahedra& cells);
 
 /// The mesh less the flagged triangles and the vertices that none has then.
-FrameMesh without(const FrameMesh& mesh, const std::vector<char>& left_out);
+FrameMesh without(FrameMesh mesh, const std::vector<char>& left_out);
 
 /// Adds vertices that stand on no particle, and triangles, which are no facets.
 void append(FrameMesh& mesh, const std::vector<Vec3>& points, const std::vector<Triangle>& triangles);

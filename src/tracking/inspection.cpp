@@ -329,8 +329,9 @@ void Inspector::look_off_surface(const FrameMesh& mesh, Inspection& inspection) 
 std::vector<Surface::Crossing> Inspector::newly_missed(const Inspection& now,
                                                        const std::vector<Vec3>& vertices,
                                                        const std::vector<Triangle>& triangles) const {
-    const CrossingGrid grid(now.missed, limits_.tolerance);
     std::vector<Surface::Crossing> result;
+    if (now.missed.empty()) return result;
+    const CrossingGrid grid(now.missed, limits_.tolerance);
     const auto distances = crossing_distances(vertices, triangles, grid, kCertified * limits_.tolerance);
     for (std::size_t c = 0; c < grid.size(); ++c)
         if (std::isfinite(distances[c])) result.push_back(grid[c]);

@@ -2,26 +2,64 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
+#include "disjoint_sets.h"
 #include "meshing/lightening.h"
 #include "tracking/failing.h"
 
 namespace isotrack {
+namespace {
+
+constexpr int kTries = 2;
+constexpr double kAround = 4.0;  // details: what was in vain within so much stays as it was
+
+/// The vertices that stand on no particle, but for those of whole components, which are small.
+std::vector<char> put_in(const FrameMesh& mesh) {
+    DisjointSets components(mesh.vertices.size());
+    for (const Triangle& t : mesh.carved.triangles) {
+        components.join(t[0], t[1]);
+        components.join(t[0], t[2]);
+    }
+    std::vector<char> has_particle(mesh.vertices.size(), 0), result(mesh.vertices.size(), 0);
+    const auto& particle = mesh.carved.particle;
+    for (std::size_t v = 0; v < particle.size(); ++v)
+        if (particle[v] >= 0) has_particle[components.least(static_cast<int>(v))] = 1;
+    for (std::size_t v = 0; v < particle.size(); ++v)
+        result[v] = particle[v] < 0 && has_particle[components.least(static_cast<int>(v))];
+    return result;
+}
+
+bool any_of(const std::vector<char>& flags) {
+    return std::find(flags.begin(), flags.end(), 1) != flags.end();
+}
+
+}  // namespace
 
 std::size_t lighten_patches(MeshTrials& trials, const Surface& surface, const SizingLimits& limits) {
-    std::vector<char> put_in;
-    for (const int p : trials.mesh().carved.particle) put_in.push_back(p < 0);
-    if (std::find(put_in.begin(), put_in.end(), 1) == put_in.end()) return 0;
-    FrameMesh mesh = trials.mesh();
-    CarvedSurface& carved = mesh.carved;
-    const Lightened lightened =
-        lighten(mesh.vertices, carved.triangles, put_in, surface, trials.inspector().reached(),
-                kChangedShare * limits.tolerance, limits.detail);
-    for (std::size_t t = 0; t < carved.triangles.size(); ++t)
-        if (lightened.changed[t]) carved.inside_cell[t] = CarvedSurface::kNoCell;
-    mesh = without(mesh, lightened.gone);
-    const std::size_t went = put_in.size() - mesh.vertices.size();
-    return went > 0 && trials.try_mesh(std::move(mesh)) ? went : 0;
+    const auto& particle = trials.mesh().carved.particle;
+    if (std::none_of(particle.begin(), particle.end(), [](int p) { return p < 0; })) return 0;
+    std::vector<char> may_go = put_in(trials.mesh());
+    for (int attempt = 0; attempt < kTries && any_of(may_go); ++attempt) {
+        FrameMesh mesh = trials.mesh();
+        CarvedSurface& carved = mesh.carved;
+        const Lightened lightened =
+            lighten(mesh.vertices, carved.triangles, may_go, surface, trials.inspector().reached(),
+                    kChangedShare * limits.tolerance, limits.detail);
+        for (std::size_t t = 0; t < carved.triangles.size(); ++t)
+            if (lightened.changed[t]) carved.inside_cell[t] = CarvedSurface::kNoCell;
+        mesh = without(std::move(mesh), lightened.gone);
+        const std::size_t went = may_go.size() - mesh.vertices.size();
+        if (went == 0) return 0;
+        if (trials.try_mesh(std::move(mesh))) return went;
+        if (attempt + 1 == kTries) break;
+        const MeshTrials::Outlook outlook = trials.look_at(mesh);
+        for (const auto* places : {&outlook.newly_missed, &outlook.failing})
+            for (const Vec3& place : *places)
+                for (std::size_t v = 0; v < may_go.size(); ++v)
+                    if ((trials.mesh().vertices[v] - place).norm() < kAround * limits.detail) may_go[v] = 0;
+    }
+    return 0;
 }
 
 }  // namespace isotrack

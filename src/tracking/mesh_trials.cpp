@@ -31,11 +31,11 @@ std::vector<Vec3> MeshTrials::failing_places() const {
     return failing_in(inspection_, limits_.tolerance);
 }
 
-bool MeshTrials::try_mesh(FrameMesh other) {
+bool MeshTrials::try_mesh(FrameMesh&& other) {
     return take(std::move(other), std::numeric_limits<std::size_t>::max());
 }
 
-bool MeshTrials::try_to_mend(FrameMesh other) {
+bool MeshTrials::try_to_mend(FrameMesh&& other) {
     const std::size_t failing = failing_places().size();
     return failing > 0 && take(std::move(other), failing - 1);
 }
@@ -83,7 +83,7 @@ MeshTrials::Outlook MeshTrials::look_at(const FrameMesh& other) {
     return result;
 }
 
-bool MeshTrials::take(FrameMesh other, std::size_t most_failing) {
+bool MeshTrials::take(FrameMesh&& other, std::size_t most_failing) {
     Inspection after = inspect(other);
     const bool good = largest_of(*after.errors) <= largest_allowed() &&
                       after.farthest_crossing <= std::max(limits_.tolerance, inspection_.farthest_crossing) &&

@@ -22,10 +22,10 @@ public:
     Inspector& inspector() { return inspector_; }
 
     /// Takes a mesh if it misses nothing that the one there does not, and if its largest distances either way
-    /// are within the tolerance or no larger. Returns whether it did.
-    bool try_mesh(FrameMesh other);
+    /// are within the tolerance or no larger. Returns whether it did; if not, `other` is as it was.
+    bool try_mesh(FrameMesh&& other);
     /// Takes a mesh if moreover it fails at fewer places.
-    bool try_to_mend(FrameMesh other);
+    bool try_to_mend(FrameMesh&& other);
     /// Where another mesh fails, and what it misses that the one there does not. That stays.
     struct Outlook {
         std::vector<Vec3> failing, newly_missed;
@@ -42,7 +42,7 @@ private:
     double largest_allowed() const;
     Inspection inspect(const FrameMesh& mesh) const;
     void look_back();  // at the mesh there, after another
-    bool take(FrameMesh other, std::size_t most_failing);
+    bool take(FrameMesh&& other, std::size_t most_failing);
 
     FrameMesh& mesh_;
     Inspection& inspection_;

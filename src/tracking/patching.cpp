@@ -43,7 +43,7 @@ FrameMesh patched(FrameMesh mesh, const std::vector<const Patch*>& patches) {
         for (const int t : patch->gone) gone[t] = 1;
     }
     gone.resize(mesh.carved.triangles.size(), 0);
-    return without(mesh, gone);
+    return without(std::move(mesh), gone);
 }
 
 std::vector<Vec3> corners_of(const Patch& patch, const FrameMesh& mesh) {

@@ -43,7 +43,9 @@ TEST(MeshTrials, TakeNoMeshThatIsFartherOffOrMissesMore) {
         FrameMesh other = before;
         other.vertices[farthest].y() -= dent;
         EXPECT_FALSE(now.trials.may_have(corners_of(other)));
-        EXPECT_FALSE(now.trials.try_mesh(other));
+        const std::vector<Vec3> refused = other.vertices;
+        EXPECT_FALSE(now.trials.try_mesh(std::move(other)));
+        EXPECT_EQ(other.vertices, refused);
     }
     EXPECT_TRUE(now.trials.may_have(corners_of(before)));
     // Without the drop: no triangle is farther off.
@@ -56,8 +58,8 @@ TEST(MeshTrials, TakeNoMeshThatIsFartherOffOrMissesMore) {
 
     FrameMesh nearer = before;
     std::swap(nearer.carved.triangles.front(), nearer.carved.triangles.back());
-    EXPECT_TRUE(now.trials.try_mesh(nearer));
-    EXPECT_FALSE(now.trials.try_to_mend(before));  // nothing fails
+    EXPECT_TRUE(now.trials.try_mesh(FrameMesh(nearer)));
+    EXPECT_FALSE(now.trials.try_to_mend(FrameMesh(before)));  // nothing fails
     EXPECT_EQ(mesh.carved.triangles, nearer.carved.triangles);
 }
 

@@ -72,7 +72,7 @@ std::optional<Vec3> dual_crossing(const Tetrahedra& cells, const std::vector<Vec
 
 /// A triangle as lattice crossings see it: it stands for those that leave the inside the way it faces (unit
 /// normal . outward >= -0.2, since a crossed edge may lie nearly in the surface), so that one side of a thin
-/// sheet does not stand for the other.
+/// sheet does not stand for the other. For one without direction any triangle does.
 class FacingTriangle {
 public:
     FacingTriangle(const Vec3& a, const Vec3& b, const Vec3& c);

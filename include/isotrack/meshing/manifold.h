@@ -12,13 +12,13 @@ namespace isotrack {
 /// and edges.
 struct CarvedSurface {
     std::vector<Triangle> triangles;  ///< Output vertices, counter-clockwise seen from outside.
-    /// Per output vertex: the particle it stands on; -1 for an edge midpoint, and in a drop that was put in.
+    /// Per output vertex: the particle it stands on; -1 for an edge midpoint, and in what was put in.
     std::vector<int> particle;
     std::vector<Vec3>
         midpoints;  ///< Positions of the output vertices that stand on no particle: the last ones, in order.
     static constexpr int kNoCell = -1;
     /// Per triangle: the cell behind it; midpoints split a triangle, both halves keep its cell, and one that
-    /// is flipped keeps that of the facet in whose place it is. kNoCell: it was put in later.
+    /// is flipped keeps that of the facet in whose place it is. kNoCell: it came later.
     std::vector<int> inside_cell;
     std::vector<int> inside_facet;  ///< Per triangle: the index of that cell's vertex opposite the facet.
 

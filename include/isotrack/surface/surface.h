@@ -97,8 +97,10 @@ public:
 
     /// Where an edge between neighbouring lattice nodes crosses the surface.
     struct Crossing {
-        Vec3 point;                   ///< Linearly interpolated along the edge.
-        Eigen::Vector3f outward;      ///< Unit direction of the edge, from its end inside to its end outside.
+        Vec3 point;  ///< Linearly interpolated along the edge.
+        /// Unit direction of the edge, from its end inside to its end outside. Zero where it is of no matter
+        /// which way a mesh faces.
+        Eigen::Vector3f outward;
         std::int16_t stands_for = 1;  ///< So many crossings, itself among them: 32 767 at most.
         bool flat = false;            ///< The surface is a flat sheet where they are.
     };
