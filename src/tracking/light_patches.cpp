@@ -4,7 +4,6 @@
 #include <utility>
 #include <vector>
 
-#include "disjoint_sets.h"
 #include "meshing/lightening.h"
 #include "tracking/failing.h"
 
@@ -14,22 +13,6 @@ namespace {
 constexpr int kTries = 2;
 constexpr double kAround = 4.0;  // details: what was in vain within so much stays as it was
 
-/// The vertices that stand on no particle, but for those of whole components, which are small.
-std::vector<char> put_in(const FrameMesh& mesh) {
-    DisjointSets components(mesh.vertices.size());
-    for (const Triangle& t : mesh.carved.triangles) {
-        components.join(t[0], t[1]);
-        components.join(t[0], t[2]);
-    }
-    std::vector<char> has_particle(mesh.vertices.size(), 0), result(mesh.vertices.size(), 0);
-    const auto& particle = mesh.carved.particle;
-    for (std::size_t v = 0; v < particle.size(); ++v)
-        if (particle[v] >= 0) has_particle[components.least(static_cast<int>(v))] = 1;
-    for (std::size_t v = 0; v < particle.size(); ++v)
-        result[v] = particle[v] < 0 && has_particle[components.least(static_cast<int>(v))];
-    return result;
-}
-
 bool any_of(const std::vector<char>& flags) {
     return std::find(flags.begin(), flags.end(), 1) != flags.end();
 }
@@ -37,9 +20,8 @@ bool any_of(const std::vector<char>& flags) {
 }  // namespace
 
 std::size_t lighten_patches(MeshTrials& trials, const Surface& surface, const SizingLimits& limits) {
-    const auto& particle = trials.mesh().carved.particle;
-    if (std::none_of(particle.begin(), particle.end(), [](int p) { return p < 0; })) return 0;
-    std::vector<char> may_go = put_in(trials.mesh());
+    std::vector<char> may_go;
+    for (const int p : trials.mesh().carved.particle) may_go.push_back(p < 0);
     for (int attempt = 0; attempt < kTries && any_of(may_go); ++attempt) {
         FrameMesh mesh = trials.mesh();
         CarvedSurface& carved = mesh.carved;

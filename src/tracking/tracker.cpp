@@ -404,10 +404,8 @@ public:
     /// which takes longer to look at, is looked at when all else passes, and so is what lies between
     /// crossings.
     void certify();
-    /// Exchanges parts of the mesh for those of the lattice.
+    /// Exchanges parts of the mesh for those of the lattice, with no more vertices than they need.
     void patch();
-    /// Takes out of these what they can do without.
-    void lighten();
 
 private:
     const TrackerOptions& options() const { return tracker_.options; }
@@ -583,12 +581,6 @@ void Tracker::Impl::Making::patch() {
     }
     work_.inspector->look_off_surface(work_.mesh, work_.inspection);
     if (!fails_much) patch_failing(of_mesh, thickness, work_.surface);
-}
-
-void Tracker::Impl::Making::lighten() {
-    if (!guided() || options().min_edge) return;
-    const StageTimer timer(work_.frame.seconds, "certify");
-    MeshTrials of_mesh(work_.mesh, work_.inspection, *work_.inspector, work_.limits);
     lighten_patches(of_mesh, work_.surface, work_.limits);
 }
 
@@ -650,12 +642,9 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         making.mesh_particles();
         making.certify();
         making.patch();
-        // The next births and deaths go by what is left of errors, but not by those of lighter patches, which
-        // come anew each time.
-        if (options.method != Method::Paper)
+        if (options.method != Method::Paper)  // the next births and deaths go by what is left of errors
             last_mesh.evidence.error =
                 errors_at_particles(work->mesh, *work->inspection.errors, particles.size());
-        making.lighten();
     }
     frame.relocated += dt->profile().relocated - relocated;
     inherit_velocities(particle_triangles(work->mesh.carved));
