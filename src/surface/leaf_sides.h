@@ -42,15 +42,13 @@ public:
         if (place.leaf != &leaf) {
             place.leaf = &leaf;
             const float* values = leaf.buffer().data();
-            std::array<float, kDim> zero{};  // stays so unless a value is not finite
+            Rows rows;
             for (std::uint64_t& layer : place.layers) {
                 layer = 0;
-                for (int y = 0; y < kDim; ++y, values += kDim) {
-                    layer |= static_cast<std::uint64_t>(negative(values)) << kDim * y;
-                    for (int z = 0; z < kDim; ++z) zero[z] += values[z] * 0.0f;
-                }
+                for (int y = 0; y < kDim; ++y, values += kDim)
+                    layer |= static_cast<std::uint64_t>(rows.negative(values)) << kDim * y;
             }
-            finite_ = finite_ && std::all_of(zero.begin(), zero.end(), [](float sum) { return sum == 0.0f; });
+            finite_ = finite_ && rows.are_finite();
         }
         return place.layers;
     }
@@ -66,19 +64,43 @@ private:
         Layers layers;
     };
 
-    /// Bit i: whether values[i] is below 0.
-    static unsigned negative(const float* values) {
+    /// Reads values by rows of eight. What is finite is zero when it is taken from itself.
+    class Rows {
+    public:
+        /// Bit i: whether values[i] is below 0.
+        unsigned negative(const float* values) { return four(values) | four(values + 4) << 4; }
+        /// Whether all values read so far are.
 #ifdef __SSE__
-        const auto four = [](const float* v) {
-            return static_cast<unsigned>(_mm_movemask_ps(_mm_cmplt_ps(_mm_loadu_ps(v), _mm_setzero_ps())));
-        };
-        return four(values) | four(values + 4) << 4;
+        bool are_finite() const {
+            return _mm_movemask_ps(_mm_cmpneq_ps(taken_, _mm_setzero_ps())) == 0;
+        }
+
+    private:
+        unsigned four(const float* values) {
+            const __m128 v = _mm_loadu_ps(values);
+            taken_ = _mm_or_ps(taken_, _mm_sub_ps(v, v));
+            return static_cast<unsigned>(_mm_movemask_ps(_mm_cmplt_ps(v, _mm_setzero_ps())));
+        }
+
+        __m128 taken_ = _mm_setzero_ps();
 #else
-        unsigned result = 0;
-        for (int i = 0; i < kDim; ++i) result |= static_cast<unsigned>(values[i] < 0.0f) << i;
-        return result;
+        bool are_finite() const {
+            return taken_ == 0.0f;
+        }
+
+    private:
+        unsigned four(const float* values) {
+            unsigned result = 0;
+            for (int i = 0; i < 4; ++i) {
+                taken_ += values[i] - values[i];
+                result |= static_cast<unsigned>(values[i] < 0.0f) << i;
+            }
+            return result;
+        }
+
+        float taken_ = 0.0f;
 #endif
-    }
+    };
 
     std::vector<Place> places_;
     bool finite_ = true;
