@@ -382,7 +382,11 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
                                                   : other_places(trials.mesh(), surface);
             if (others.empty()) continue;
             make_lattice(others, kTriedReach);
-            search(patcher->unlike(others, !everywhere), true);
+            const auto middle =
+                others.begin() + static_cast<std::ptrdiff_t>(patcher->put_differing_first(others));
+            const std::vector<Vec3> differing(others.begin(), middle), rest(middle, others.end());
+            for (const auto* some : {&differing, &rest})
+                if (now > 0 && !effort.is_enough()) search(patcher->unlike(*some, !everywhere), true);
         }
         all_have_lattice = false;
     }
