@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <tuple>
@@ -13,7 +14,7 @@
 #include <utility>
 
 #include "disjoint_sets.h"
-#include "meshing/crossing_triangles.h"
+#include "isotrack/meshing/self_intersections.h"
 #include "meshing/triangle_distance.h"
 #include "sampling/compact.h"
 
@@ -434,20 +435,22 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
     leave_out(coming, [&](const Triangle& t) {
         return std::any_of(t.begin(), t.end(), [&](int v) { return !comes[v]; });
     });
-    std::vector<Triangle> all;
+    std::vector<Triangle> all, looked_at;  // strips, ascending
     // What comes and is crossed by a strip makes way for it.
     for (int round = 0; round < kMostRounds; ++round) {
-        const auto strips = join(outer, coming, at, normals, kFarthest * source.spacing());
+        auto strips = join(outer, coming, at, normals, kFarthest * source.spacing());
         if (!strips) return std::nullopt;
         all = coming;
         all.insert(all.end(), strips->begin(), strips->end());
-        std::vector<char> is_strip(coming.size(), 0);
-        is_strip.resize(all.size(), 1);
-        std::vector<char> stays = crossing_triangles(at, all, is_strip);
-        stays.resize(coming.size());
-        for (char& flag : stays) flag = !flag;
-        if (std::find(stays.begin(), stays.end(), 0) == stays.end()) break;
-        compact(coming, stays);
+        std::sort(strips->begin(), strips->end());
+        std::vector<Triangle> fresh;
+        std::set_difference(strips->begin(), strips->end(), looked_at.begin(), looked_at.end(),
+                            std::back_inserter(fresh));
+        const std::vector<char> crossed = crossed_by(at, fresh, coming);
+        if (std::find(crossed.begin(), crossed.end(), 1) == crossed.end()) break;
+        std::size_t next = 0;
+        leave_out(coming, [&](const Triangle&) { return crossed[next++]; });
+        looked_at = std::move(*strips);
     }
     const Numbers now = numbers_of(all), before = numbers_of(going);
     patch.components = now.components - before.components;

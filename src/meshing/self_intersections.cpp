@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -115,6 +116,19 @@ constexpr std::size_t kSlabSize = 4096;               // boxes that begin in a s
 constexpr std::size_t kFewest = 4, kLeastSlab = 512;  // slabs, unless they would have fewer boxes
 constexpr std::ptrdiff_t kScanBelow = 100;  // boxes; splitting further costs more than comparing all
 
+/// `order`: the axis of space that is each axis of the box.
+TriangleBox boxed(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles, std::size_t t,
+                  const Vec3& from, const std::array<int, 3>& order) {
+    const Box box = box_of(points, triangles[t]);
+    TriangleBox result;
+    for (int k = 0; k < 3; ++k) {
+        result.low[k] = rounded_down(box.min()[order[k]] - from[order[k]]);
+        result.high[k] = rounded_up(box.max()[order[k]] - from[order[k]]);
+    }
+    result.triangle = static_cast<int>(t);
+    return result;
+}
+
 /// Throws where a vertex is not finite or a triangle names one that is not there.
 void check(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
     for (std::size_t i = 0; i < points.size(); ++i)
@@ -144,18 +158,9 @@ Slabs::Slabs(const std::vector<Vec3>& points, const std::vector<Triangle>& trian
     for (const Vec3& p : points) bounds.extend(p);
     int longest = 0;
     if (!bounds.isEmpty()) bounds.sizes().maxCoeff(&longest);
-    const auto box_at = [&](std::size_t t) {
-        const Box box = box_of(points, triangles[t]);
-        TriangleBox result;
-        for (int k = 0; k < 3; ++k) {
-            const int axis = (longest + 3 + k - kSlabAxis) % 3;
-            const double from = bounds.min()[axis];
-            result.low[k] = rounded_down(box.min()[axis] - from);
-            result.high[k] = rounded_up(box.max()[axis] - from);
-        }
-        result.triangle = static_cast<int>(t);
-        return result;
-    };
+    std::array<int, 3> order;
+    for (int k = 0; k < 3; ++k) order[k] = (longest + 3 + k - kSlabAxis) % 3;
+    const auto box_at = [&](std::size_t t) { return boxed(points, triangles, t, bounds.min(), order); };
 
     constexpr std::size_t kEvery = 64;  // triangle of which one is a sample
     std::vector<float> sample;
@@ -223,20 +228,17 @@ bool any_cross(const std::vector<Vec3>& points, const std::vector<Triangle>& som
         Box box;
         const Triangle* triangle;
     };
-    const auto boxed = [&](const Triangle& t) {
-        const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-        return Boxed{Box(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)), &t};
-    };
+    const auto with_box = [&](const Triangle& t) { return Boxed{box_of(points, t), &t}; };
     const auto area = [&](const Triangle& t) { return has_area(points[t[0]], points[t[1]], points[t[2]]); };
     std::vector<Boxed> ours, near;
     Box bounds;
     for (const Triangle& t : some)
         if (area(t)) {
-            ours.push_back(boxed(t));
+            ours.push_back(with_box(t));
             bounds.extend(ours.back().box);
         }
     for (const Triangle& t : others)
-        if (const Boxed other = boxed(t); bounds.intersects(other.box) && area(t)) near.push_back(other);
+        if (const Boxed other = with_box(t); bounds.intersects(other.box) && area(t)) near.push_back(other);
     for (auto t = ours.begin(); t != ours.end(); ++t) {
         const auto is_crossed_by = [&](const Boxed& other) {
             return t->box.intersects(other.box) && cross(points, *t->triangle, *other.triangle);
@@ -246,6 +248,33 @@ bool any_cross(const std::vector<Vec3>& points, const std::vector<Triangle>& som
             return true;
     }
     return false;
+}
+
+std::vector<char> crossed_by(const std::vector<Vec3>& points, const std::vector<Triangle>& some,
+                             const std::vector<Triangle>& others) {
+    std::vector<char> crossed(others.size(), 0);
+    Box bounds;
+    for (const Triangle& t : some) bounds.extend(box_of(points, t));
+    const auto boxes_of = [&](const std::vector<Triangle>& triangles) {
+        std::vector<TriangleBox> boxes;
+        for (std::size_t t = 0; t < triangles.size(); ++t) {
+            const auto& [i, j, k] = triangles[t];
+            if (bounds.intersects(box_of(points, triangles[t])) && has_area(points[i], points[j], points[k]))
+                boxes.push_back(boxed(points, triangles, t, bounds.min(), {0, 1, 2}));
+        }
+        return boxes;
+    };
+    std::vector<TriangleBox> ours = boxes_of(some), near = boxes_of(others);
+    const int behind = static_cast<int>(others.size());  // CGAL takes boxes with one number for the same
+    for (TriangleBox& box : ours) box.triangle += behind;
+    CGAL::box_intersection_d(
+        ours.begin(), ours.end(), near.begin(), near.end(),
+        [&](const TriangleBox& a, const TriangleBox& b) {
+            char& flag = crossed[b.triangle];
+            flag = flag || cross(points, some[a.triangle - behind], others[b.triangle]);
+        },
+        kScanBelow);
+    return crossed;
 }
 
 }  // namespace isotrack

@@ -152,9 +152,9 @@ TEST(SelfIntersections, AgreesWithConstructedIntersectionsOnLatticeSoups) {
     }
 }
 
-TEST(AnyCross, IsWhetherAPairHasOneOfTheFirst) {
+TEST(SomeAndOthers, ArePairsOfTheSameSoup) {
     std::mt19937 random(7);
-    int with = 0, without = 0;
+    int with = 0, without = 0, crossed = 0;
     for (int round = 0; round < 400; ++round) {
         TriangleMesh soup;
         for (int i = 0; i < 12; ++i)
@@ -171,9 +171,40 @@ TEST(AnyCross, IsWhetherAPairHasOneOfTheFirst) {
             std::any_of(pairs.begin(), pairs.end(), [](const auto& pair) { return pair.first < kSome; });
         EXPECT_EQ(any_cross(soup.points, some, others), expected);
         ++(expected ? with : without);
+
+        std::vector<char> flags(others.size(), 0);
+        for (const auto& [first, second] : pairs)
+            if (first < kSome && second >= kSome) flags[second - kSome] = 1;
+        EXPECT_EQ(crossed_by(soup.points, some, others), flags);
+        EXPECT_EQ(crossed_by(soup.points, {}, others), std::vector<char>(others.size(), 0));
+        crossed += static_cast<int>(std::count(flags.begin(), flags.end(), 1));
     }
     EXPECT_GT(with, 50);
     EXPECT_GT(without, 50);
+    EXPECT_GT(crossed, 50);
+}
+
+// What is crossed among many: those that all pairs of both name.
+TEST(SomeAndOthers, AreCrossedAsAllPairsSay) {
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> anywhere(0.0, 1.0), near(-0.1, 0.1);
+    std::vector<Vec3> points;
+    std::vector<Triangle> triangles;
+    for (int t = 0; t < 1200; ++t) {
+        const Vec3 middle(anywhere(random), anywhere(random), anywhere(random));
+        for (int k = 0; k < 3; ++k) points.push_back(middle + Vec3(near(random), near(random), near(random)));
+        triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+    }
+    constexpr int kSome = 200;
+    const std::vector<Triangle> some(triangles.begin(), triangles.begin() + kSome),
+        others(triangles.begin() + kSome, triangles.end());
+    std::vector<char> flags(others.size(), 0);
+    for (const auto& [first, second] : self_intersections(points, triangles))
+        if (first < kSome && second >= kSome) flags[second - kSome] = 1;
+    const auto count = std::count(flags.begin(), flags.end(), 1);
+    EXPECT_GT(count, 100);
+    EXPECT_LT(count, 1000);
+    EXPECT_EQ(crossed_by(points, some, others), flags);
 }
 
 // The cheap test that sets neighbours round a vertex apart must never be wrong, however thin the wedges.
