@@ -181,12 +181,25 @@ public:
     /// Those of some places where a patch would change the numbers; where none fits, too, if `or_unfit`.
     std::vector<Vec3> unlike(const std::vector<Vec3>& places, bool or_unfit) {
         const TriangleBins& bins = bins_of_mesh();
-        std::vector<char> is_unlike(places.size());
+        std::vector<std::vector<int>> gone(places.size());
         tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
-            const auto patch =
-                patch_for(triangles_around(places[p], kSmall * resolution_, bins), bins, lattice_);
-            is_unlike[p] = patch ? patch->euler != 0 || patch->components != 0 : or_unfit;
+            gone[p] = triangles_around(places[p], kSmall * resolution_, bins);
         });
+        std::vector<std::vector<int>> fresh = gone;  // where triangles are large, many places have the same
+        std::sort(fresh.begin(), fresh.end());
+        fresh.erase(std::unique(fresh.begin(), fresh.end()), fresh.end());
+        fresh.erase(std::remove_if(fresh.begin(), fresh.end(),
+                                   [&](const std::vector<int>& some) { return change_.count(some) > 0; }),
+                    fresh.end());
+        std::vector<std::optional<MeshNumbers>> change(fresh.size());
+        tbb::parallel_for(std::size_t{0}, fresh.size(),
+                          [&](std::size_t n) { change[n] = change_by(patch_for(fresh[n], bins, lattice_)); });
+        for (std::size_t n = 0; n < fresh.size(); ++n) change_.emplace(std::move(fresh[n]), change[n]);
+        std::vector<char> is_unlike;
+        for (const std::vector<int>& some : gone) {
+            const auto& by_patch = change_.at(some);
+            is_unlike.push_back(by_patch ? !(*by_patch == MeshNumbers{0, 0}) : or_unfit);
+        }
         std::vector<Vec3> result = places;
         compact(result, is_unlike);
         return result;
@@ -201,23 +214,24 @@ public:
     void forget() {
         bins_.reset();
         lattice_.forget();
+        change_.clear();
         try_again();
     }
-    /// Takes the patch within `reach` resolutions of a place if it is wanted by its own numbers, near enough
-    /// to the surface, wanted by the numbers of the whole mesh, if it crosses nothing, and if its mesh is
-    /// taken: `try_mesh`. Returns whether; nullopt where it was wanted by all numbers and failed then. The
-    /// places from `place` to `end` are likely to be next with this reach: until `try_again` they must not
-    /// change or move.
+    /// Takes the patch within `reach` resolutions of a place if it is wanted by how it changes the numbers,
+    /// near enough to the surface, wanted by the numbers of the whole mesh, if it crosses nothing, and if its
+    /// mesh is taken: `try_mesh`. Returns whether; nullopt where it was wanted by all numbers and failed
+    /// then. The places from `place` to `end` are likely to be next with this reach: until `try_again` they
+    /// must not change or move.
     template <typename IsWanted, typename AreWanted, typename TryMesh>
     std::optional<bool> patch_at(const Vec3* place, const Vec3* end, double reach, const IsWanted& is_wanted,
                                  const AreWanted& are_wanted, const TryMesh& try_mesh) {
         const FrameMesh& mesh = trials_.mesh();
         const TriangleBins& bins = bins_of_mesh();
-        const auto& [gone, patch] = made_at(place, end, reach);
+        const auto& [gone, patch] = made_at(place, end, reach, is_wanted);
         if (!tried_.insert(gone).second) return false;
         ++effort_.patches;
         effort_.area += area_of(gone, mesh) / (resolution_ * resolution_);
-        if (!patch || !is_wanted(*patch)) return false;
+        if (!patch || !is_wanted(*change_by(patch))) return false;
         const std::vector<Vec3> corners = corners_of(*patch, mesh);
         if (!trials_.may_have(corners)) {
             ++effort_.too_far;
@@ -239,10 +253,14 @@ public:
 private:
     struct Made {
         std::vector<int> gone;
-        std::optional<Patch> patch;  // if there is one that was not tried
+        std::optional<Patch> patch;  // if there is one that was not tried and may be wanted
     };
+    static std::optional<MeshNumbers> change_by(const std::optional<Patch>& patch) {
+        return patch ? std::optional(MeshNumbers{patch->components, patch->euler}) : std::nullopt;
+    }
     /// The patch at `place`, made beside those at the next ones if it is not there yet.
-    const Made& made_at(const Vec3* place, const Vec3* end, double reach) {
+    template <typename IsWanted>
+    const Made& made_at(const Vec3* place, const Vec3* end, double reach, const IsWanted& is_wanted) {
         constexpr std::ptrdiff_t kAtOnce = 4;
         for (std::size_t p = 0; made_reach_ == reach && p < made_.size(); ++p)
             if (made_from_ + p == place) return made_[p];
@@ -253,8 +271,12 @@ private:
         tbb::parallel_for(std::size_t{0}, made_.size(), [&](std::size_t p) {
             auto& [gone, patch] = made_[p];
             gone = triangles_around(place[p], reach * resolution_, bins);
-            if (tried_.count(gone) == 0) patch = patch_for(gone, bins, lattice_);
+            const auto known = change_.find(gone);
+            const bool is_of_use = known == change_.end() || (known->second && is_wanted(*known->second));
+            if (is_of_use && tried_.count(gone) == 0) patch = patch_for(gone, bins, lattice_);
         });
+        for (const auto& [gone, patch] : made_)
+            change_.emplace(gone, change_by(patch));  // unless it is known
         return made_.front();
     }
     const TriangleBins& bins_of_mesh() {
@@ -269,6 +291,8 @@ private:
     PatchSource lattice_;
     std::optional<TriangleBins> bins_;  // of the mesh as it is
     std::set<std::vector<int>> tried_;  // triangles of it that went
+    // By triangles of it that go: how a patch for them changes the numbers, if there is one.
+    std::map<std::vector<int>, std::optional<MeshNumbers>> change_;
     // At the places from made_from_ on.
     std::vector<Made> made_;
     const Vec3* made_from_ = nullptr;
@@ -302,17 +326,17 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     std::size_t count = 0;
     std::set<std::array<double, 3>> around;  // vertices where a patch would be right, but did not fit
     // Beyond a patch what it joins or parts may hang together: about so many components more or fewer.
-    const auto may_be_wanted = [&](const Patch& patch, long most) {
-        if (patch.euler == 0 && patch.components == 0) return false;
-        const long fewest = std::min(patch.components, 0L) - 1, many = std::max(patch.components, 0L) + 1;
+    const auto may_be_wanted = [&](const MeshNumbers& change, long most) {
+        if (change.euler == 0 && change.components == 0) return false;
+        const long fewest = std::min(change.components, 0L) - 1, many = std::max(change.components, 0L) + 1;
         for (long more = fewest; more <= many; ++more)
-            if (astray({numbers.components + more, numbers.euler + patch.euler}) <= most) return true;
+            if (astray({numbers.components + more, numbers.euler + change.euler}) <= most) return true;
         return false;
     };
     const auto patch_at = [&](const Vec3* place, const Vec3* end, double reach, long most) {
         MeshNumbers then{};
         const auto taken = patcher->patch_at(
-            place, end, reach, [&](const Patch& patch) { return may_be_wanted(patch, most); },
+            place, end, reach, [&](const MeshNumbers& change) { return may_be_wanted(change, most); },
             [&](const MeshNumbers& of_other) { return astray(then = of_other) <= most; },
             [&](FrameMesh other) { return trials.try_mesh(std::move(other)); });
         if (!taken) {
@@ -436,7 +460,8 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
     const auto patch_twice = [&](const Vec3& place, double reach) {
         FrameMesh before = trials.mesh();
         if (!patch_at(
-                place, reach, [](const Patch&) { return true; }, [](const MeshNumbers&) { return true; }))
+                place, reach, [](const MeshNumbers&) { return true; },
+                [](const MeshNumbers&) { return true; }))
             return false;
         patch_topology(trials, thickness, surface, effort);
         const bool good = numbers_of(trials.mesh()) == numbers;
@@ -458,7 +483,7 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
     };
     const auto patch_alone = [&](const Vec3& place, double reach) {
         return patch_at(
-            place, reach, [](const Patch& patch) { return patch.euler == 0; },
+            place, reach, [](const MeshNumbers& change) { return change.euler == 0; },
             [&](const MeshNumbers& of_other) { return of_other == numbers; });
     };
     patch_near(places, kApart, patch_alone);
