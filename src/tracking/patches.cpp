@@ -42,8 +42,8 @@ constexpr int kMostPatches = 1000, kMostTooFar = 50, kMostRefused = 50;  // see 
 constexpr std::size_t kMostTriangles = 10000000;                         // of the whole meshes they make
 constexpr double kLikelyShare = 0.8;            // of patches and area, for places that are likely
 constexpr std::size_t kMostEverywhere = 20000;  // places all over a mesh
-constexpr long kMostAstray = 30;                // components and handles, to look for them there
-constexpr std::size_t kMostPairs = 100000000;   // of components
+constexpr long kMostAstray = 30;  // components and handles: more are not found at less likely places
+constexpr std::size_t kMostPairs = 100000000;  // of components
 
 /// Where the topology of the mesh is another than the lattice's.
 std::vector<Vec3> faulty_places(const FrameMesh& mesh, const LatticeTopology& topology, double resolution) {
@@ -130,6 +130,15 @@ std::vector<Vec3> places_everywhere(const FrameMesh& mesh, double resolution) {
     if (all.size() > kMostEverywhere || area > kMostAreaOfPlace * static_cast<double>(all.size()))
         all.clear();
     return all;
+}
+
+/// None where the surface has no lattice.
+std::optional<MeshNumbers> numbers_of_lattice(const Surface& surface) {
+    const auto euler = surface.lattice_euler();
+    if (!euler) return std::nullopt;
+    const auto components = surface.lattice_component_count();
+    if (!components) return std::nullopt;
+    return MeshNumbers{static_cast<long>(*components), *euler};
 }
 
 /// What a search has tried, of all patchers that take part in it.
@@ -303,14 +312,12 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
                            Effort& effort) {
     const double resolution = surface.resolution();
     const std::vector<Vec3> faulty = faulty_places(trials.mesh(), trials.topology(), resolution);
-    const auto euler = surface.lattice_euler();
-    if (!euler) return 0;
-    const auto count_wanted = surface.lattice_component_count();
-    if (!count_wanted) return 0;
+    const auto of_lattice = numbers_of_lattice(surface);
+    if (!of_lattice) return 0;
     // Components and handles that are too many or too few.
     const auto astray = [&](const MeshNumbers& numbers) {
-        const long components = numbers.components - static_cast<long>(*count_wanted),
-                   handles = components - (numbers.euler - *euler) / 2;
+        const long components = numbers.components - of_lattice->components,
+                   handles = components - (numbers.euler - of_lattice->euler) / 2;
         return std::abs(components) + std::abs(handles);
     };
     MeshNumbers numbers = numbers_of(trials.mesh());
@@ -395,13 +402,16 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
             patch_near(and_unmatched({suspicious.begin(), suspicious.begin() + differing}), -1, kSmall);
             if (now == 0 || effort.is_enough()) return count;
         }
-        search(and_unmatched(patcher->unlike(suspicious, places.size() <= kMostPlaces)), all_have_lattice);
+        if (!effort.is_enough(share))
+            search(and_unmatched(patcher->unlike(suspicious, places.size() <= kMostPlaces)),
+                   all_have_lattice);
     }
+    if (now > kMostAstray) return count;
     share = 1.0;
     if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true)) {
         // Where something small is, which takes a tenth of the time, then everywhere.
         for (const bool everywhere : {false, true}) {
-            if (now == 0 || effort.is_enough() || (everywhere && now > kMostAstray)) break;
+            if (now == 0 || effort.is_enough()) break;
             std::vector<Vec3> others = everywhere ? places_everywhere(trials.mesh(), resolution)
                                                   : other_places(trials.mesh(), surface);
             if (others.empty()) continue;
@@ -490,7 +500,9 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
     for (const Vec3& v : trials.mesh().vertices)
         if (is_near(v, kAround) && fails_near(v, kAround)) around.push_back(v);
     patch_near(around, kAround, patch_alone);
-    patch_near(places, kApart, patch_twice);
+    if (failing.empty()) return count;
+    if (const auto of_lattice = numbers_of_lattice(surface); of_lattice && numbers == *of_lattice)
+        patch_near(places, kApart, patch_twice);
     return count;
 }
 
