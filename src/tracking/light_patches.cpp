@@ -4,13 +4,16 @@
 #include <utility>
 #include <vector>
 
+#include "isotrack/sampling/particle_grid.h"
 #include "meshing/lightening.h"
+#include "parallel_for_each.h"
 #include "tracking/failing.h"
 
 namespace isotrack {
 namespace {
 
 constexpr int kTries = 2;
+constexpr std::size_t kGrain = 256;
 constexpr double kAround = 4.0;  // details: what was in vain within so much stays as it was
 
 bool any_of(const std::vector<char>& flags) {
@@ -35,11 +38,16 @@ std::size_t lighten_patches(MeshTrials& trials, const Surface& surface, const Si
         if (went == 0) return 0;
         if (trials.try_mesh(std::move(mesh))) return went;
         if (attempt + 1 == kTries) break;
-        const MeshTrials::Outlook outlook = trials.look_at(mesh);
-        for (const auto* places : {&outlook.newly_missed, &outlook.failing})
-            for (const Vec3& place : *places)
-                for (std::size_t v = 0; v < may_go.size(); ++v)
-                    if ((trials.mesh().vertices[v] - place).norm() < kAround * limits.detail) may_go[v] = 0;
+        MeshTrials::Outlook outlook = trials.look_at(mesh);
+        std::vector<Vec3>& in_vain = outlook.newly_missed;
+        in_vain.insert(in_vain.end(), outlook.failing.begin(), outlook.failing.end());
+        const double around = kAround * limits.detail;
+        PointGrid grid(in_vain, around, in_vain.size());
+        grid.take_new();
+        parallel_for_each(may_go.size(), kGrain, [&](std::size_t v) {
+            if (may_go[v])
+                grid.for_each_within(trials.mesh().vertices[v], around, [&](int, double) { may_go[v] = 0; });
+        });
     }
     return 0;
 }
