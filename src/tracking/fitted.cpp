@@ -12,7 +12,6 @@ namespace isotrack {
 namespace {
 
 constexpr int kSteps = 6, kStepsBeforeFlips = 3;  // others follow these
-constexpr int kRings = 2;
 
 void add_ring(std::vector<char>& flags, const std::vector<Triangle>& triangles) {
     const std::vector<char> before = flags;
@@ -65,7 +64,7 @@ void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface&
         if (!lone[v]) movable[v] = 1;  // where it was is not known
         if (!movable[v]) mesh.vertices[v] = position_[mesh.carved.particle[v]].cast<double>();
     }
-    for (int ring = 0; ring < kRings; ++ring) add_ring(movable, triangles);
+    add_ring(movable, triangles);
     const bool flips = is_first && tolerance;
     fit(mesh.vertices, triangles, surface, flips ? kStepsBeforeFlips : kSteps, movable);
     if (flips) {
