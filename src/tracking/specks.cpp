@@ -173,23 +173,16 @@ std::size_t join_specks(MeshTrials& trials, CellLabels& labels, const Carve& car
     std::set<int> refused;  // inside cells
     for (bool more = true; more;) {
         more = false;
-        std::vector<int> inside_cells;  // one of each speck
-        for (const std::vector<char>& speck : each_speck(trials.mesh(), needed()))
-            inside_cells.push_back(
-                trials.mesh().carved.inside_cell[std::find(speck.begin(), speck.end(), 1) - speck.begin()]);
-        std::set<int> changed;  // whether these are specks now is not known
-        for (const int inside : inside_cells) {
-            if (inside == CarvedSurface::kNoCell || refused.count(inside) > 0 || changed.count(inside) > 0)
-                continue;
+        for (const std::vector<char>& speck : each_speck(trials.mesh(), needed())) {
+            const auto t = std::find(speck.begin(), speck.end(), 1) - speck.begin();
+            const int inside = trials.mesh().carved.inside_cell[t];
+            if (inside == CarvedSurface::kNoCell || refused.count(inside) > 0) continue;
             const std::set<int> part = inside_with(inside, labels, cells);
-            if (part.size() == kMostCells || !join(part)) {
-                refused.insert(part.begin(), part.end());
-                continue;
+            if (part.size() < kMostCells && join(part)) {
+                more = ++joined < kMostSpecks;  // the triangles are others now
+                break;
             }
-            more = ++joined < kMostSpecks;
-            if (!more) break;
-            const std::set<int> whole = inside_with(inside, labels, cells);
-            changed.insert(whole.begin(), whole.end());
+            refused.insert(part.begin(), part.end());
         }
     }
     trials.topology();
