@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <tuple>
 #include <utility>
 
+#include "isotrack/meshing/self_intersections.h"
+#include "meshing/triangle_distance.h"
 #include "parallel_for_each.h"
 #include "surface/float_precision.h"
 #include "surface/thread_probes.h"
@@ -111,52 +114,154 @@ PolygonMesh quadrangles_near(const std::vector<Vec3>& places, double reach, cons
     return result;
 }
 
-TriangleMesh lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surface) {
+namespace {
+
+/// Quadrangles around crossed edges with all vertices that their triangles may have.
+struct Pieces {
+    /// Of the cells first, brought to the surface where they stay in their cells; then the crossing that each
+    /// quadrangle is around, then those on faces between cells.
+    std::vector<Vec3> points;
+    std::vector<std::array<int, 4>> on_face;  // of each quadrangle: on its edge from corner k to the next
+
+    Pieces(const PolygonMesh& quadrangles, const Surface& surface);
+};
+
+Pieces::Pieces(const PolygonMesh& quadrangles, const Surface& surface) : points(quadrangles.points) {
     const Eigen::Affine3d lattice = surface.lattice(), to_lattice = lattice.inverse();
     const auto cell_of = [&](const Vec3& p) -> Vec3 { return (to_lattice * p).array().floor(); };
     const auto& in_cell = quadrangles.points;
     const std::size_t cells = in_cell.size(), quads = quadrangles.quads.size();
     const std::vector<char> shares_cell = share_cells(in_cell, to_lattice);
     ThreadProbes probes(surface);
-    TriangleMesh mesh;
-    mesh.points = in_cell;
-    mesh.points.resize(cells + quads);
+    points.resize(cells + quads);
     parallel_for_each(cells, kGrain, [&](std::size_t v) {
         if (shares_cell[v]) return;
         const auto p = probes.local().project(in_cell[v]);
-        if (p && cell_of(*p) == cell_of(in_cell[v])) mesh.points[v] = *p;
+        if (p && cell_of(*p) == cell_of(in_cell[v])) points[v] = *p;
     });
     parallel_for_each(quads, kGrain, [&](std::size_t q) {
         const auto& [i, j, k, l] = quadrangles.quads[q];
-        mesh.points[cells + q] = crossing_amid({cell_of(in_cell[i]), cell_of(in_cell[j]), cell_of(in_cell[k]),
-                                                cell_of(in_cell[l])},
-                                               lattice, surface.resolution(), probes.local())
-                                     .value_or(0.25 * (in_cell[i] + in_cell[j] + in_cell[k] + in_cell[l]));
+        points[cells + q] = crossing_amid({cell_of(in_cell[i]), cell_of(in_cell[j]), cell_of(in_cell[k]),
+                                           cell_of(in_cell[l])},
+                                          lattice, surface.resolution(), probes.local())
+                                .value_or(0.25 * (in_cell[i] + in_cell[j] + in_cell[k] + in_cell[l]));
     });
     // The two quadrangles of an edge are around crossings on one face of both cells; between these it passes.
-    std::vector<std::array<int, 4>> on_face(quads);
+    on_face.resize(quads);
     const std::vector<CellEdge> edges = cell_edges(quadrangles);
     for (std::size_t e = 0; e < edges.size(); ++e) {
         const CellEdge& one = edges[e];
-        Vec3 middle = mesh.points[cells + one.quadrangle];
-        on_face[one.quadrangle][one.k] = static_cast<int>(mesh.points.size());
+        Vec3 middle = points[cells + one.quadrangle];
+        on_face[one.quadrangle][one.k] = static_cast<int>(points.size());
         if (e + 1 < edges.size() && one.low == edges[e + 1].low && one.high == edges[e + 1].high) {
             const CellEdge& other = edges[++e];
-            middle = 0.5 * (middle + mesh.points[cells + other.quadrangle]);
+            middle = 0.5 * (middle + points[cells + other.quadrangle]);
             on_face[other.quadrangle][other.k] = on_face[one.quadrangle][one.k];
         }
-        mesh.points.push_back(middle);
+        points.push_back(middle);
     }
-    mesh.triangles.reserve(8 * quads);
-    for (std::size_t q = 0; q < quads; ++q)
+    for (Vec3& p : points) p = to_float_precision(p);
+}
+
+/// The triangles of a quadrangle on the diagonal that is nearer to the crossing it is around.
+struct Halves {
+    std::array<Triangle, 2> triangles;
+    double distance2;  // from the crossing
+
+    Halves(const std::array<int, 4>& corners, const Vec3& crossing, const std::vector<Vec3>& points) {
+        distance2 = std::numeric_limits<double>::infinity();
+        for (const int first : {0, 1}) {
+            const auto corner = [&](int k) { return corners[(first + k) % 4]; };
+            const std::array<Triangle, 2> halves = {
+                {{corner(0), corner(1), corner(2)}, {corner(0), corner(2), corner(3)}}};
+            double least = std::numeric_limits<double>::infinity();
+            for (const auto& [i, j, k] : halves)
+                least = std::min(least, squared_distance(crossing, points[i], points[j], points[k]));
+            if (least < distance2) {
+                distance2 = least;
+                triangles = halves;
+            }
+        }
+    }
+};
+
+/// The mesh without points that no triangle has.
+TriangleMesh compacted(std::vector<Vec3> points, std::vector<Triangle> triangles) {
+    TriangleMesh mesh;
+    std::vector<int> number(points.size(), -1);
+    for (Triangle& t : triangles)
+        for (int& v : t) {
+            if (number[v] < 0) {
+                number[v] = static_cast<int>(mesh.points.size());
+                mesh.points.push_back(points[v]);
+            }
+            v = number[v];
+        }
+    mesh.triangles = std::move(triangles);
+    return mesh;
+}
+
+}  // namespace
+
+TriangleMesh lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surface) {
+    Pieces pieces(quadrangles, surface);
+    TriangleMesh mesh;
+    mesh.triangles.reserve(8 * quadrangles.quads.size());
+    for (std::size_t q = 0; q < quadrangles.quads.size(); ++q)
         for (int k = 0; k < 4; ++k) {
-            const int a = quadrangles.quads[q][k], b = quadrangles.quads[q][(k + 1) % 4], f = on_face[q][k],
-                      crossing = static_cast<int>(cells + q);
+            const int a = quadrangles.quads[q][k], b = quadrangles.quads[q][(k + 1) % 4],
+                      f = pieces.on_face[q][k], crossing = static_cast<int>(quadrangles.points.size() + q);
             mesh.triangles.push_back({a, f, crossing});
             mesh.triangles.push_back({f, b, crossing});
         }
-    for (Vec3& p : mesh.points) p = to_float_precision(p);
+    mesh.points = std::move(pieces.points);
     return mesh;
+}
+
+TriangleMesh light_lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surface, double close) {
+    const Pieces pieces(quadrangles, surface);
+    const std::vector<Vec3>& points = pieces.points;
+    const std::size_t cells = quadrangles.points.size(), quads = quadrangles.quads.size();
+    std::vector<char> is_whole(quads, 0), has_point_on_face(points.size(), 0);
+    std::vector<Triangle> triangles;
+    std::vector<std::size_t> quad_of;  // each triangle
+    const auto add = [&](const Triangle& t, std::size_t q) {
+        triangles.push_back(t);
+        quad_of.push_back(q);
+    };
+    for (bool more = true; more;) {
+        triangles.clear();
+        quad_of.clear();
+        for (std::size_t q = 0; q < quads; ++q) {
+            const auto& corners = quadrangles.quads[q];
+            const auto& faces = pieces.on_face[q];
+            const int crossing = static_cast<int>(cells + q);
+            const Halves halves(corners, points[crossing], points);
+            const auto is_there = [&](int f) { return has_point_on_face[f] != 0; };
+            if (halves.distance2 <= close * close && std::none_of(faces.begin(), faces.end(), is_there)) {
+                for (const Triangle& t : halves.triangles) add(t, q);
+                continue;
+            }
+            for (int k = 0; k < 4; ++k) {
+                const int a = corners[k], b = corners[(k + 1) % 4], f = faces[k];
+                if (is_there(f)) {
+                    add({a, f, crossing}, q);
+                    add({f, b, crossing}, q);
+                } else {
+                    add({a, b, crossing}, q);
+                }
+            }
+        }
+        more = false;
+        for (const auto& [t, u] : self_intersections(points, triangles))
+            for (const std::size_t q : {quad_of[t], quad_of[u]}) {
+                if (is_whole[q]) continue;
+                is_whole[q] = 1;
+                more = true;
+                for (const int f : pieces.on_face[q]) has_point_on_face[f] = 1;
+            }
+    }
+    return compacted(points, std::move(triangles));
 }
 
 }  // namespace isotrack

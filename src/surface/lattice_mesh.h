@@ -25,6 +25,10 @@ Real off_node(Real value, Real resolution) {
 /// values.
 TriangleMesh lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surface);
 
+/// The same with fewer triangles: two of a quadrangle where they are within `close` of the crossing, four
+/// around it where they are not, and more only where that keeps triangles from crossing.
+TriangleMesh light_lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surface, double close);
+
 /// The quadrangles with a corner in a cube around a place, `reach` to each side.
 PolygonMesh quadrangles_near(const std::vector<Vec3>& places, double reach, const PolygonMesh& quadrangles);
 

@@ -422,6 +422,10 @@ TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reac
     return lattice_mesh_of(quadrangles_near(places, reach, impl_->all_quadrangles()), *this);
 }
 
+TriangleMesh LevelSet::light_lattice_mesh(double close) const {
+    return light_lattice_mesh_of(impl_->all_quadrangles(), *this, close);
+}
+
 std::vector<Surface::Diagonal> LevelSet::diagonals() const {
     return gather<Diagonal>(impl_->crossed, [this] {
         return [this, nodes = NodeValues(impl_->grid->constTree(), &impl_->leaves)](

@@ -32,12 +32,22 @@ std::vector<Vec3> MeshTrials::failing_places() const {
 }
 
 bool MeshTrials::try_mesh(FrameMesh&& other) {
-    return take(std::move(other), std::numeric_limits<std::size_t>::max());
+    return take_if_harmless(std::move(other), std::numeric_limits<std::size_t>::max());
 }
 
 bool MeshTrials::try_to_mend(FrameMesh&& other) {
     const std::size_t failing = failing_places().size();
-    return failing > 0 && take(std::move(other), failing - 1);
+    return failing > 0 && take_if_harmless(std::move(other), failing - 1);
+}
+
+bool MeshTrials::take_if_misses_less(FrameMesh&& other) {
+    Inspection after = inspect(other);
+    const bool good = after.missed.size() < inspection_.missed.size();
+    if (good)
+        take(std::move(other), std::move(after));
+    else
+        look_back();
+    return good;
 }
 
 void MeshTrials::put_back(FrameMesh mesh) {
@@ -83,21 +93,24 @@ MeshTrials::Outlook MeshTrials::look_at(const FrameMesh& other) {
     return result;
 }
 
-bool MeshTrials::take(FrameMesh&& other, std::size_t most_failing) {
+bool MeshTrials::take_if_harmless(FrameMesh&& other, std::size_t most_failing) {
     Inspection after = inspect(other);
     const bool good = largest_of(*after.errors) <= largest_allowed() &&
                       after.farthest_crossing <= std::max(limits_.tolerance, inspection_.farthest_crossing) &&
                       after.lost_crossings <= inspection_.lost_crossings &&
                       failing_in(after, limits_.tolerance).size() <= most_failing &&
                       inspector_.newly_missed(after, mesh_.vertices, mesh_.carved.triangles).empty();
-    if (good) {
-        mesh_ = std::move(other);
-        inspection_ = std::move(after);
-        is_topology_known_ = false;
-    } else {
+    if (good)
+        take(std::move(other), std::move(after));
+    else
         look_back();
-    }
     return good;
+}
+
+void MeshTrials::take(FrameMesh&& other, Inspection&& after) {
+    mesh_ = std::move(other);
+    inspection_ = std::move(after);
+    is_topology_known_ = false;
 }
 
 }  // namespace isotrack

@@ -26,6 +26,8 @@ public:
     bool try_mesh(FrameMesh&& other);
     /// Takes a mesh if moreover it fails at fewer places.
     bool try_to_mend(FrameMesh&& other);
+    /// Takes a mesh if it misses less of the surface, however far off its triangles are.
+    bool take_if_misses_less(FrameMesh&& other);
     /// Where another mesh fails, and what it misses that the one there does not. That stays.
     struct Outlook {
         std::vector<Vec3> failing, newly_missed;
@@ -42,7 +44,8 @@ private:
     double largest_allowed() const;
     Inspection inspect(const FrameMesh& mesh) const;
     void look_back();  // at the mesh there, after another
-    bool take(FrameMesh&& other, std::size_t most_failing);
+    bool take_if_harmless(FrameMesh&& other, std::size_t most_failing);
+    void take(FrameMesh&& other, Inspection&& after);
 
     FrameMesh& mesh_;
     Inspection& inspection_;

@@ -4,10 +4,13 @@
 #include <optional>
 #include <utility>
 
+#include "isotrack/meshing/mesh_topology.h"
+#include "isotrack/meshing/self_intersections.h"
 #include "meshing/crossing_triangles.h"
 #include "meshing/patch.h"
 #include "parallel_for_each.h"
 #include "sampling/compact.h"
+#include "tracking/failing.h"
 #include "tracking/patching.h"
 
 namespace isotrack {
@@ -144,6 +147,20 @@ private:
 
 bool fails_at_many(const MeshTrials& trials, const Surface& surface) {
     return apart(trials.failing_places(), kApart * surface.resolution()).size() > kManyFailing;
+}
+
+bool take_lattice_mesh(MeshTrials& trials, const Surface& surface, const SizingLimits& limits) {
+    constexpr double kNearlyEverywhere = 0.02;  // places that fail for each triangle
+    const double most = kNearlyEverywhere * static_cast<double>(trials.mesh().carved.triangles.size());
+    if (static_cast<double>(trials.failing_places().size()) < most) return false;
+    const TriangleMesh lattice = surface.light_lattice_mesh(kCertified * limits.tolerance);
+    const MeshTopology topology = mesh_topology(lattice);
+    if (lattice.triangles.empty() || !topology.closed() || !topology.manifold() ||
+        !self_intersections(lattice).empty())
+        return false;
+    FrameMesh mesh;
+    append(mesh, lattice.points, lattice.triangles);
+    return trials.take_if_misses_less(std::move(mesh));
 }
 
 std::size_t mend_in_batches(MeshTrials& trials, const Surface& surface) {

@@ -11,6 +11,11 @@ namespace isotrack {
 constexpr std::size_t kManyFailing = 64;
 bool fails_at_many(const MeshTrials& trials, const Surface& surface);
 
+/// Where a mesh fails nearly everywhere, as one of a density that is all noise does: takes the lattice's for
+/// it, with no more triangles than that needs, if it misses less of the surface and crosses nothing. No
+/// vertex stands on a particle then. Returns whether it did.
+bool take_lattice_mesh(MeshTrials& trials, const Surface& surface, const SizingLimits& limits);
+
 /// Where a mesh fails at many places, as on a splash with drops and sheets of a voxel, of which particles
 /// make crumbs: parts around the places are exchanged for those of the lattice of the surface, small ones
 /// first. Patches that have nothing in common are put in together; those that cross something, that leave as

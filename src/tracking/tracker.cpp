@@ -573,6 +573,7 @@ void Tracker::Impl::Making::patch() {
     const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
     MeshTrials of_mesh(work_.mesh, work_.inspection, *work_.inspector, work_.limits);
     const bool fails_much = fails_at_many(of_mesh, work_.surface);
+    if (fails_much && take_lattice_mesh(of_mesh, work_.surface, work_.limits)) return;
     if (fails_much) mend_in_batches(of_mesh, work_.surface);
     if (!has_topology()) {
         if (work_.inspection.topology.speck.size() != work_.mesh.carved.triangles.size())

@@ -16,6 +16,7 @@
 #include "isotrack/meshing/mesh_topology.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "isotrack/surface/level_set.h"
+#include "meshing/triangle_distance.h"
 #include "surface/ambiguous_faces.h"
 #include "surface/float_precision.h"
 
@@ -283,6 +284,39 @@ TEST(LatticeMesh, HasTheTopologyOfVolumeToMeshWhateverTheNodesAre) {
             expect_crossings(level_set);
             expect_within_cells(level_set);
             EXPECT_TRUE(self_intersections(level_set.lattice_mesh(kAll, kFarReach)).empty());
+        }
+}
+
+/// With few triangles it has the same topology, crosses nothing, and is near every crossing.
+void expect_light(const LevelSet& level_set, double close, double most_triangles) {
+    const TriangleMesh mesh = level_set.light_lattice_mesh(close);
+    const MeshTopology topology = mesh_topology(mesh), wanted = mesh_topology(volume_to_mesh(level_set));
+    EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
+    EXPECT_EQ(topology.components, wanted.components);
+    EXPECT_EQ(topology.euler, wanted.euler);
+    EXPECT_TRUE(self_intersections(mesh).empty());
+    EXPECT_EQ(places_of(mesh.points).size(), mesh.points.size());
+    const auto crossings = level_set.crossings();
+    EXPECT_LE(static_cast<double>(mesh.triangles.size()),
+              most_triangles * static_cast<double>(crossings.size()));
+    double farthest = 0.0;
+    for (std::size_t c = 0; c < crossings.size(); c += 7) {  // each is compared with all triangles
+        double nearest = 1e9;
+        for (const auto& [i, j, k] : mesh.triangles)
+            nearest = std::min(nearest, squared_distance(crossings[c].point, mesh.points[i], mesh.points[j],
+                                                         mesh.points[k]));
+        farthest = std::max(farthest, std::sqrt(nearest));
+    }
+    EXPECT_LT(farthest, close + 1e-5);  // rounded
+}
+
+TEST(LatticeMesh, IsLightWithinADistanceOfTheCrossings) {
+    const LevelSet ball = cube_of([](int x, int y, int z) { return Vec3(x, y, z).norm() - 7.3; });
+    expect_light(ball, 0.5, 2.0);
+    for (const double share : {0.05, 0.3, 0.5, 0.8})
+        for (unsigned seed = 0; seed < 2; ++seed) {
+            expect_light(strewn(seed, share), 0.5, 6.0);
+            expect_light(strewn(seed, share), 0.05, 8.0);
         }
 }
 

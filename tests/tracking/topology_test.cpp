@@ -9,6 +9,7 @@
 #include <functional>
 #include <ostream>
 #include <random>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -184,6 +185,43 @@ TEST_P(Topology, IsThatOfTheLevelSet) {
             EXPECT_TRUE(self_intersections(result.mesh).empty());
             EXPECT_TRUE(result.within_tolerance) << result.max_error << ", lost " << result.lost_crossings;
             EXPECT_EQ(facing_away(result.mesh, surface), 0u);
+        }
+    }
+}
+
+/// Nodes inside and outside at random: nothing that particles could follow.
+TEST(TopologyOfNoise, IsThatOfTheLattice) {
+    constexpr int kSide = 8;
+    std::mt19937 random(3);
+    const auto uniform = [&] { return random() / 4294967296.0; };
+    auto grid = openvdb::FloatGrid::create(1.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    auto values = grid->getAccessor();
+    for (int x = -kSide; x <= kSide; ++x)
+        for (int y = -kSide; y <= kSide; ++y)
+            for (int z = -kSide; z <= kSide; ++z) {
+                const bool border = std::max({std::abs(x), std::abs(y), std::abs(z)}) == kSide;
+                const double size = 0.1 + 0.8 * uniform();
+                values.setValue({x, y, z}, static_cast<float>(border || uniform() < 0.5 ? size : -size));
+            }
+    const LevelSet surface(grid);
+    const MeshTopology wanted = mesh_topology(volume_to_mesh(surface));
+    for (const bool fit : {false, true}) {
+        SCOPED_TRACE(fit ? "--fit" : "plain");
+        TrackerOptions options;
+        options.tolerance = 0.5;
+        options.fit = fit;
+        Tracker tracker(options);
+        for (int frame = 0; frame < 2; ++frame) {
+            const TrackedFrame result = tracker.advance(surface);
+            const MeshTopology topology = mesh_topology(result.mesh);
+            EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
+            EXPECT_EQ(topology.components, wanted.components);
+            EXPECT_EQ(topology.euler, wanted.euler);
+            EXPECT_TRUE(self_intersections(result.mesh).empty());
+            EXPECT_EQ(result.lost_crossings, 0u);
+            const std::set<Id> ids(result.mesh.ids.begin(), result.mesh.ids.end());
+            EXPECT_EQ(ids.size(), result.mesh.points.size());
         }
     }
 }

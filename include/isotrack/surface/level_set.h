@@ -56,6 +56,7 @@ public:
     std::optional<std::size_t> lattice_component_count() const override;
     std::optional<std::vector<Box>> lattice_components() const override;
     TriangleMesh lattice_mesh(const std::vector<Vec3>& places, double reach) const override;
+    TriangleMesh light_lattice_mesh(double close) const override;
 
     /// True when there is no surface: no sign change between neighbouring voxels.
     bool empty() const;
