@@ -435,7 +435,8 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
     leave_out(coming, [&](const Triangle& t) {
         return std::any_of(t.begin(), t.end(), [&](int v) { return !comes[v]; });
     });
-    std::vector<Triangle> all, looked_at;  // strips, ascending
+    std::vector<Triangle> all;
+    std::vector<Triangle> looked_at;  // strips of the round before, ascending
     // What comes and is crossed by a strip makes way for it.
     for (int round = 0; round < kMostRounds; ++round) {
         auto strips = join(outer, coming, at, normals, kFarthest * source.spacing());

@@ -165,11 +165,11 @@ Pieces::Pieces(const PolygonMesh& quadrangles, const Surface& surface) : points(
 
 /// The triangles of a quadrangle on the diagonal that is nearer to the crossing it is around.
 struct Halves {
-    std::array<Triangle, 2> triangles;
-    double distance2;  // from the crossing
+    std::array<Triangle, 2> triangles{};
+    double distance2 = std::numeric_limits<double>::infinity();  // from the crossing
 
+    Halves() = default;
     Halves(const std::array<int, 4>& corners, const Vec3& crossing, const std::vector<Vec3>& points) {
-        distance2 = std::numeric_limits<double>::infinity();
         for (const int first : {0, 1}) {
             const auto corner = [&](int k) { return corners[(first + k) % 4]; };
             const std::array<Triangle, 2> halves = {
@@ -186,7 +186,7 @@ struct Halves {
 };
 
 /// The mesh without points that no triangle has.
-TriangleMesh compacted(std::vector<Vec3> points, std::vector<Triangle> triangles) {
+TriangleMesh compacted(const std::vector<Vec3>& points, std::vector<Triangle> triangles) {
     TriangleMesh mesh;
     std::vector<int> number(points.size(), -1);
     for (Triangle& t : triangles)
@@ -222,6 +222,10 @@ TriangleMesh light_lattice_mesh_of(const PolygonMesh& quadrangles, const Surface
     const Pieces pieces(quadrangles, surface);
     const std::vector<Vec3>& points = pieces.points;
     const std::size_t cells = quadrangles.points.size(), quads = quadrangles.quads.size();
+    std::vector<Halves> halves(quads);
+    parallel_for_each(quads, kGrain, [&](std::size_t q) {
+        halves[q] = {quadrangles.quads[q], points[cells + q], points};
+    });
     std::vector<char> is_whole(quads, 0), has_point_on_face(points.size(), 0);
     std::vector<Triangle> triangles;
     std::vector<std::size_t> quad_of;  // each triangle
@@ -236,10 +240,9 @@ TriangleMesh light_lattice_mesh_of(const PolygonMesh& quadrangles, const Surface
             const auto& corners = quadrangles.quads[q];
             const auto& faces = pieces.on_face[q];
             const int crossing = static_cast<int>(cells + q);
-            const Halves halves(corners, points[crossing], points);
             const auto is_there = [&](int f) { return has_point_on_face[f] != 0; };
-            if (halves.distance2 <= close * close && std::none_of(faces.begin(), faces.end(), is_there)) {
-                for (const Triangle& t : halves.triangles) add(t, q);
+            if (halves[q].distance2 <= close * close && std::none_of(faces.begin(), faces.end(), is_there)) {
+                for (const Triangle& t : halves[q].triangles) add(t, q);
                 continue;
             }
             for (int k = 0; k < 4; ++k) {
@@ -253,13 +256,15 @@ TriangleMesh light_lattice_mesh_of(const PolygonMesh& quadrangles, const Surface
             }
         }
         more = false;
-        for (const auto& [t, u] : self_intersections(points, triangles))
+        const auto pairs = self_intersections(points, triangles);
+        for (const auto& [t, u] : pairs)
             for (const std::size_t q : {quad_of[t], quad_of[u]}) {
                 if (is_whole[q]) continue;
                 is_whole[q] = 1;
                 more = true;
                 for (const int f : pieces.on_face[q]) has_point_on_face[f] = 1;
             }
+        if (!more && !pairs.empty()) return {};
     }
     return compacted(points, std::move(triangles));
 }

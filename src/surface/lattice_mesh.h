@@ -26,7 +26,8 @@ Real off_node(Real value, Real resolution) {
 TriangleMesh lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surface);
 
 /// The same with fewer triangles: two of a quadrangle where they are within `close` of the crossing, four
-/// around it where they are not, and more only where that keeps triangles from crossing.
+/// around it where they are not, and more only where that keeps triangles from crossing. Empty where some
+/// cross all the same.
 TriangleMesh light_lattice_mesh_of(const PolygonMesh& quadrangles, const Surface& surface, double close);
 
 /// The quadrangles with a corner in a cube around a place, `reach` to each side.

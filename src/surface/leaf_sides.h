@@ -6,7 +6,6 @@
 #include <xmmintrin.h>
 #endif
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -64,40 +63,40 @@ private:
         Layers layers;
     };
 
-    /// Reads values by rows of eight. What is finite is zero when it is taken from itself.
+    /// Reads values by rows of eight.
     class Rows {
     public:
         /// Bit i: whether values[i] is below 0.
         unsigned negative(const float* values) { return four(values) | four(values + 4) << 4; }
         /// Whether all values read so far are.
-#ifdef __SSE__
         bool are_finite() const {
+#ifdef __SSE__
             return _mm_movemask_ps(_mm_cmpneq_ps(taken_, _mm_setzero_ps())) == 0;
+#else
+            return taken_ == 0.0f;
+#endif
         }
 
     private:
         unsigned four(const float* values) {
+#ifdef __SSE__
             const __m128 v = _mm_loadu_ps(values);
             taken_ = _mm_or_ps(taken_, _mm_sub_ps(v, v));
             return static_cast<unsigned>(_mm_movemask_ps(_mm_cmplt_ps(v, _mm_setzero_ps())));
-        }
-
-        __m128 taken_ = _mm_setzero_ps();
 #else
-        bool are_finite() const {
-            return taken_ == 0.0f;
-        }
-
-    private:
-        unsigned four(const float* values) {
             unsigned result = 0;
             for (int i = 0; i < 4; ++i) {
                 taken_ += values[i] - values[i];
                 result |= static_cast<unsigned>(values[i] < 0.0f) << i;
             }
             return result;
+#endif
         }
 
+        // Each value taken from itself: zero unless one is not finite.
+#ifdef __SSE__
+        __m128 taken_ = _mm_setzero_ps();
+#else
         float taken_ = 0.0f;
 #endif
     };

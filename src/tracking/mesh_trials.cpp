@@ -42,7 +42,8 @@ bool MeshTrials::try_to_mend(FrameMesh&& other) {
 
 bool MeshTrials::take_if_misses_less(FrameMesh&& other) {
     Inspection after = inspect(other);
-    const bool good = after.missed.size() < inspection_.missed.size();
+    const bool good =
+        after.missed.size() < inspection_.missed.size() && after.lost_crossings <= inspection_.lost_crossings;
     if (good)
         take(std::move(other), std::move(after));
     else

@@ -26,7 +26,7 @@ public:
     bool try_mesh(FrameMesh&& other);
     /// Takes a mesh if moreover it fails at fewer places.
     bool try_to_mend(FrameMesh&& other);
-    /// Takes a mesh if it misses less of the surface, however far off its triangles are.
+    /// Takes a mesh if it misses less of the surface and loses no more, however far off its triangles are.
     bool take_if_misses_less(FrameMesh&& other);
     /// Where another mesh fails, and what it misses that the one there does not. That stays.
     struct Outlook {

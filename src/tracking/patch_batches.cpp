@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "isotrack/meshing/mesh_topology.h"
-#include "isotrack/meshing/self_intersections.h"
 #include "meshing/crossing_triangles.h"
 #include "meshing/patch.h"
 #include "parallel_for_each.h"
@@ -150,14 +149,14 @@ bool fails_at_many(const MeshTrials& trials, const Surface& surface) {
 }
 
 bool take_lattice_mesh(MeshTrials& trials, const Surface& surface, const SizingLimits& limits) {
-    constexpr double kNearlyEverywhere = 0.02;  // places that fail for each triangle
-    const double most = kNearlyEverywhere * static_cast<double>(trials.mesh().carved.triangles.size());
-    if (static_cast<double>(trials.failing_places().size()) < most) return false;
+    constexpr double kLeastFailing = 0.1;  // places for each triangle
+    const auto triangles = static_cast<double>(trials.mesh().carved.triangles.size());
+    if (trials.inspection().missed.empty() ||
+        static_cast<double>(trials.failing_places().size()) < kLeastFailing * triangles)
+        return false;
     const TriangleMesh lattice = surface.light_lattice_mesh(kCertified * limits.tolerance);
     const MeshTopology topology = mesh_topology(lattice);
-    if (lattice.triangles.empty() || !topology.closed() || !topology.manifold() ||
-        !self_intersections(lattice).empty())
-        return false;
+    if (lattice.triangles.empty() || !topology.closed() || !topology.manifold()) return false;
     FrameMesh mesh;
     append(mesh, lattice.points, lattice.triangles);
     return trials.take_if_misses_less(std::move(mesh));

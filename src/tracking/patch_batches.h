@@ -11,9 +11,9 @@ namespace isotrack {
 constexpr std::size_t kManyFailing = 64;
 bool fails_at_many(const MeshTrials& trials, const Surface& surface);
 
-/// Where a mesh fails nearly everywhere, as one of a density that is all noise does: takes the lattice's for
-/// it, with no more triangles than that needs, if it misses less of the surface and crosses nothing. No
-/// vertex stands on a particle then. Returns whether it did.
+/// Where a mesh fails at one place for ten triangles or more, as one of a density that is all noise does:
+/// takes the lattice's for it, `light_lattice_mesh`, if it misses less of the surface. No vertex stands on a
+/// particle then. Returns whether it did.
 bool take_lattice_mesh(MeshTrials& trials, const Surface& surface, const SizingLimits& limits);
 
 /// Where a mesh fails at many places, as on a splash with drops and sheets of a voxel, of which particles

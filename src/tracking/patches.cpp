@@ -300,7 +300,8 @@ private:
     PatchSource lattice_;
     std::optional<TriangleBins> bins_;  // of the mesh as it is
     std::set<std::vector<int>> tried_;  // triangles of it that went
-    // By triangles of it that go: how a patch for them changes the numbers, if there is one.
+    // By triangles of it that go, all that were tried among them: how a patch for them changes the numbers,
+    // if there is one.
     std::map<std::vector<int>, std::optional<MeshNumbers>> change_;
     // At the places from made_from_ on.
     std::vector<Made> made_;

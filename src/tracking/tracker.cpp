@@ -404,8 +404,11 @@ public:
     /// which takes longer to look at, is looked at when all else passes, and so is what lies between
     /// crossings.
     void certify();
-    /// Exchanges parts of the mesh for those of the lattice, with no more vertices than they need.
+    /// Exchanges parts of the mesh for those of the lattice, with no more vertices than they need; all of it
+    /// where it fails nearly everywhere.
     void patch();
+    /// Whether the mesh is that of the particles, whatever parts of it were exchanged.
+    bool is_of_particles() const { return is_of_particles_; }
 
 private:
     const TrackerOptions& options() const { return tracker_.options; }
@@ -440,6 +443,7 @@ private:
     std::optional<Densifier> densifier_;  // none in the paper's method, which mends nothing
     std::size_t added_ = 0;
     int relabellings_ = 0;
+    bool is_of_particles_ = true;
 };
 
 void Tracker::Impl::Making::make_mesh() {
@@ -573,7 +577,16 @@ void Tracker::Impl::Making::patch() {
     const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
     MeshTrials of_mesh(work_.mesh, work_.inspection, *work_.inspector, work_.limits);
     const bool fails_much = fails_at_many(of_mesh, work_.surface);
-    if (fails_much && take_lattice_mesh(of_mesh, work_.surface, work_.limits)) return;
+    if (fails_much) {
+        std::vector<double> errors =
+            errors_at_particles(work_.mesh, *work_.inspection.errors, particles().size());
+        if (take_lattice_mesh(of_mesh, work_.surface, work_.limits)) {
+            is_of_particles_ = false;
+            tracker_.last_mesh.evidence.error = std::move(errors);
+            work_.inspector->look_off_surface(work_.mesh, work_.inspection);
+            return;
+        }
+    }
     if (fails_much) mend_in_batches(of_mesh, work_.surface);
     if (!has_topology()) {
         if (work_.inspection.topology.speck.size() != work_.mesh.carved.triangles.size())
@@ -643,12 +656,14 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         making.mesh_particles();
         making.certify();
         making.patch();
-        if (options.method != Method::Paper)  // the next births and deaths go by what is left of errors
+        if (options.method != Method::Paper &&
+            making.is_of_particles())  // the next births and deaths go by what is left of errors
             last_mesh.evidence.error =
                 errors_at_particles(work->mesh, *work->inspection.errors, particles.size());
+        inherit_velocities(making.is_of_particles() ? particle_triangles(work->mesh.carved)
+                                                    : last_mesh.triangles);
     }
     frame.relocated += dt->profile().relocated - relocated;
-    inherit_velocities(particle_triangles(work->mesh.carved));
     name_vertices(work->mesh, frame.mesh);
     frame.particles = particles.size();
     for (const Id id : particles.id) frame.born += id >= first_of_frame;

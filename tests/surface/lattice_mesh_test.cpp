@@ -315,13 +315,14 @@ TEST(LatticeMesh, IsLightWithinADistanceOfTheCrossings) {
     expect_light(ball, 0.5, 2.0);
     for (const double share : {0.05, 0.3, 0.5, 0.8})
         for (unsigned seed = 0; seed < 2; ++seed) {
-            expect_light(strewn(seed, share), 0.5, 6.0);
-            expect_light(strewn(seed, share), 0.05, 8.0);
+            expect_light(strewn(seed, share), 0.5, 4.0);
+            expect_light(strewn(seed, share), 0.05, 6.0);
         }
 }
 
 /// Triangles have an area, and no two vertices are in one place.
 TEST(LatticeMesh, IsSoundWhereNodesAreOnTheSurface) {
+    int count = 0;  // of light meshes
     for (const Vec3& voxel : {Vec3(1, 1, 1), Vec3(0.01, 0.01, 0.01)})
         for (unsigned seed = 0; seed < 4; ++seed) {
             std::mt19937 random(seed);
@@ -332,15 +333,28 @@ TEST(LatticeMesh, IsSoundWhereNodesAreOnTheSurface) {
                     return kValues[any(random) + 2] * voxel.x();
                 },
                 voxel);
-            const TriangleMesh mesh = level_set.lattice_mesh(kAll, kFarReach);
-            const MeshTopology ours = mesh_topology(mesh), theirs = mesh_topology(volume_to_mesh(level_set));
-            EXPECT_TRUE(ours.closed() && ours.oriented());
-            EXPECT_EQ(ours.components, theirs.components);
-            EXPECT_EQ(ours.euler, theirs.euler);
-            EXPECT_EQ(places_of(mesh.points).size(), mesh.points.size());
-            const std::vector<double> angles = smallest_angles(mesh);
-            EXPECT_GT(*std::min_element(angles.begin(), angles.end()), 0.001);
+            const MeshTopology theirs = mesh_topology(volume_to_mesh(level_set));
+            const auto expect_sound = [&](const TriangleMesh& mesh) {
+                const MeshTopology ours = mesh_topology(mesh);
+                EXPECT_TRUE(ours.closed() && ours.oriented());
+                EXPECT_EQ(ours.components, theirs.components);
+                EXPECT_EQ(ours.euler, theirs.euler);
+                EXPECT_EQ(places_of(mesh.points).size(), mesh.points.size());
+                const std::vector<double> angles = smallest_angles(mesh);
+                EXPECT_GT(*std::min_element(angles.begin(), angles.end()), 0.001);
+            };
+            const TriangleMesh mesh = level_set.lattice_mesh(kAll, kFarReach),
+                               light = level_set.light_lattice_mesh(0.5 * voxel.x());
+            expect_sound(mesh);
+            if (light.empty()) {
+                EXPECT_FALSE(self_intersections(mesh).empty());
+                continue;
+            }
+            expect_sound(light);
+            EXPECT_TRUE(self_intersections(light).empty());
+            ++count;
         }
+    EXPECT_GT(count, 0);
 }
 
 TEST(LatticeMesh, FacesOutwardInMirroredAndStretchedLattices) {

@@ -212,6 +212,8 @@ TEST(TopologyOfNoise, IsThatOfTheLattice) {
         options.tolerance = 0.5;
         options.fit = fit;
         Tracker tracker(options);
+        std::set<Id> ids;
+        std::size_t vertices = 0;
         for (int frame = 0; frame < 2; ++frame) {
             const TrackedFrame result = tracker.advance(surface);
             const MeshTopology topology = mesh_topology(result.mesh);
@@ -220,8 +222,12 @@ TEST(TopologyOfNoise, IsThatOfTheLattice) {
             EXPECT_EQ(topology.euler, wanted.euler);
             EXPECT_TRUE(self_intersections(result.mesh).empty());
             EXPECT_EQ(result.lost_crossings, 0u);
-            const std::set<Id> ids(result.mesh.ids.begin(), result.mesh.ids.end());
-            EXPECT_EQ(ids.size(), result.mesh.points.size());
+            // No vertex stands on a particle, and none has the id of another.
+            for (const Id id : tracker.particles().id) EXPECT_EQ(ids.count(id), 0u);
+            ids.insert(result.mesh.ids.begin(), result.mesh.ids.end());
+            for (const Id id : tracker.particles().id) EXPECT_EQ(ids.count(id), 0u);
+            vertices += result.mesh.points.size();
+            EXPECT_EQ(ids.size(), vertices);
         }
     }
 }

@@ -153,8 +153,8 @@ public:
     virtual TriangleMesh lattice_mesh(const std::vector<Vec3>& /*places*/, double /*reach*/) const {
         return {};
     }
-    /// All of it, with few triangles, within `close` of the crossings instead of through them. Triangles
-    /// seldom cross. This default has none.
+    /// All of it, with few triangles, within `close` of the crossings instead of through them, and none that
+    /// cross. Empty where there is no such mesh, as for this default.
     virtual TriangleMesh light_lattice_mesh(double /*close*/) const { return {}; }
     /// Of that mesh, for much less than its price: the Euler number.
     virtual std::optional<long> lattice_euler() const { return std::nullopt; }

@@ -68,9 +68,11 @@ constexpr double kTurnedOverDeg = 90.0;
 struct TrackedFrame {
     /// Closed, oriented, 2-manifold; per vertex the id and the velocity (displacement since the last frame)
     /// of its particle, beside which it may stand: moved by the fit, or along the surface where triangles
-    /// were sharp. Drops too small for tetrahedra have no particles: new ids in every frame, and no velocity.
+    /// were sharp. Drops too small for tetrahedra have no particles, nor have parts that the lattice of the
+    /// surface is taken for, which is the whole mesh where all is noise: new ids in every frame, and no
+    /// velocity.
     TriangleMesh mesh;
-    /// Vertices beyond these are copies that keep the mesh manifold, or of such drops.
+    /// Vertices beyond these are copies that keep the mesh manifold, or stand on none of them.
     std::size_t particles = 0;
     std::size_t born = 0, died = 0, seeded = 0, lost = 0;
     int sweeps = 0;             ///< Relaxation sweeps, over those particles that had to move.
