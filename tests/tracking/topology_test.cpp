@@ -161,6 +161,14 @@ std::size_t facing_away(const TriangleMesh& mesh, const LevelSet& surface) {
     return count;
 }
 
+void expect_sound(const TriangleMesh& mesh, const MeshTopology& wanted) {
+    const MeshTopology topology = mesh_topology(mesh);
+    EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
+    EXPECT_EQ(topology.components, wanted.components);
+    EXPECT_EQ(topology.euler, wanted.euler);
+    EXPECT_TRUE(self_intersections(mesh).empty());
+}
+
 class Topology : public ::testing::TestWithParam<Solid> {};
 
 TEST_P(Topology, IsThatOfTheLevelSet) {
@@ -178,11 +186,7 @@ TEST_P(Topology, IsThatOfTheLevelSet) {
         Tracker tracker(options);
         for (int frame = 0; frame < 2; ++frame) {  // cold, and warm
             const TrackedFrame result = tracker.advance(surface);
-            const MeshTopology topology = mesh_topology(result.mesh);
-            EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
-            EXPECT_EQ(topology.components, wanted.components);
-            EXPECT_EQ(topology.euler, wanted.euler);
-            EXPECT_TRUE(self_intersections(result.mesh).empty());
+            expect_sound(result.mesh, wanted);
             EXPECT_TRUE(result.within_tolerance) << result.max_error << ", lost " << result.lost_crossings;
             EXPECT_EQ(facing_away(result.mesh, surface), 0u);
         }
@@ -216,11 +220,7 @@ TEST(TopologyOfNoise, IsThatOfTheLattice) {
         std::size_t vertices = 0;
         for (int frame = 0; frame < 2; ++frame) {
             const TrackedFrame result = tracker.advance(surface);
-            const MeshTopology topology = mesh_topology(result.mesh);
-            EXPECT_TRUE(topology.closed() && topology.oriented() && topology.manifold());
-            EXPECT_EQ(topology.components, wanted.components);
-            EXPECT_EQ(topology.euler, wanted.euler);
-            EXPECT_TRUE(self_intersections(result.mesh).empty());
+            expect_sound(result.mesh, wanted);
             EXPECT_EQ(result.lost_crossings, 0u);
             // No vertex stands on a particle, and none has the id of another.
             for (const Id id : tracker.particles().id) EXPECT_EQ(ids.count(id), 0u);
