@@ -9,9 +9,7 @@
 #include <numeric>
 
 #include "delaunay/spatial_order.h"
-#include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/error.h"
-#include "isotrack/meshing/convection.h"
 #include "isotrack/meshing/manifold.h"
 #include "isotrack/meshing/open_border.h"
 #include "isotrack/meshing/untangle.h"
@@ -28,17 +26,7 @@
 #include "tracking/carry.h"
 #include "tracking/failing.h"
 #include "tracking/fitted.h"
-#include "tracking/frame_work.h"
-#include "tracking/inspection.h"
-#include "tracking/last_mesh.h"
-#include "tracking/light_patches.h"
-#include "tracking/lost_drops.h"
-#include "tracking/mesh_trials.h"
-#include "tracking/patch_batches.h"
-#include "tracking/patches.h"
-#include "tracking/refinement.h"
-#include "tracking/relabelling.h"
-#include "tracking/specks.h"
+#include "tracking/making.h"
 #include "tracking/stage_timer.h"
 #include "tracking/thinning.h"
 
@@ -48,15 +36,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kRounds = 2, kDenseRounds = 3;
 constexpr int kMendingSweeps = 3;
-constexpr int kMostMendings = 1;
 constexpr double kAstray = 0.125;  // of the particles: so many newborn at the end of the arrays are too many
-constexpr double kFew = 0.03;      // of the particles: few enough to be added by certify, without relaxation
-/// How fast the population goes after the wanted spacing.
-struct Pace {
-    PopulationBand band;
-    double thinning;
-    int sweeps;
-};
 constexpr Pace kAtFirst{{}, 0.3, 5}, kDenseAtFirst{{}, 0.3, 7};
 // What the mesh can do without goes sooner; where it is too coarse certify finds better places.
 constexpr Pace kFollowing{{0.7, 1.1}, 0.3, 3};
@@ -69,11 +49,7 @@ constexpr double kDetail = 2.0;        // tolerances
 constexpr double kDetailOfEdges = 0.25;
 constexpr double kLeastEdge = 0.5, kLargestEdge = 40.0;  // details
 constexpr double kCrossingsApart = 0.5;  // details: those between are looked at where they may be missed
-constexpr double kThick = 3.0, kThickNodes = 6.0;  // tolerances, resolutions: of a solid without thin parts
-constexpr double kBandShare = 0.85;  // of the reach: what is beyond the tolerance must be seen, too
-constexpr int kCertifyRounds = 24;
-constexpr int kMostTrials = 2;        // rounds of other labels: each takes some meshes
-constexpr int kMostRelabellings = 4;  // what changes sides might go on changing them
+constexpr double kBandShare = 0.85;      // of the reach: what is beyond the tolerance must be seen, too
 // Particles that are added at most, at a tolerance of half a detail. A clean level set takes a quarter of
 // that; one with holes in its band would take more than it has lattice edges.
 constexpr double kMostPerCrossing = 0.5;
@@ -95,181 +71,146 @@ double detail_of(const TrackerOptions& options, const Surface& surface) {
 
 }  // namespace
 
-struct Tracker::Impl {
-    TrackerOptions options;
-    Particles particles;
-    Id next_id = 0;
-    std::unique_ptr<Tetrahedralisation> dt;
-    CellLabels labels;
-    std::vector<Id> in_dt;  // the particles whose DT it is
-    Id first_astray = 0;    // those born since the particles were arranged
-    Id first_of_frame = 0;  // those born since the last frame
-    LastMesh last_mesh;
+Tracker::Impl::Impl(const TrackerOptions& o) : options(o) {
+    if (!(o.tolerance > 0.0))
+        throw OptionError("the tolerance must be a positive length, got " + std::to_string(o.tolerance));
+    if (o.angle_deg && !(*o.angle_deg > 0.0 && *o.angle_deg <= 90.0))
+        throw OptionError("the angle must be in (0, 90] degrees, got " + std::to_string(*o.angle_deg));
+    if (o.min_edge && !(*o.min_edge > 0.0)) throw OptionError("the smallest edge must be a positive length");
+    if (o.max_edge && !(*o.max_edge > 0.0)) throw OptionError("the largest edge must be a positive length");
+    if (o.min_edge && o.max_edge && *o.min_edge > *o.max_edge)
+        throw OptionError("the smallest edge is longer than the largest");
+    // In the paper's method the descent has a DT of its own; this one is for the mesh.
+    dt = make_tetrahedralisation(o.method == Method::Paper ? UpdateStrategy::Rebuild : o.delaunay);
+}
 
-    explicit Impl(const TrackerOptions& o) : options(o) {
-        if (!(o.tolerance > 0.0))
-            throw OptionError("the tolerance must be a positive length, got " + std::to_string(o.tolerance));
-        if (o.angle_deg && !(*o.angle_deg > 0.0 && *o.angle_deg <= 90.0))
-            throw OptionError("the angle must be in (0, 90] degrees, got " + std::to_string(*o.angle_deg));
-        if (o.min_edge && !(*o.min_edge > 0.0))
-            throw OptionError("the smallest edge must be a positive length");
-        if (o.max_edge && !(*o.max_edge > 0.0))
-            throw OptionError("the largest edge must be a positive length");
-        if (o.min_edge && o.max_edge && *o.min_edge > *o.max_edge)
-            throw OptionError("the smallest edge is longer than the largest");
-        // In the paper's method the descent has a DT of its own; this one is for the mesh.
-        dt = make_tetrahedralisation(o.method == Method::Paper ? UpdateStrategy::Rebuild : o.delaunay);
-    }
+UpdateStrategy Tracker::Impl::strategy() const {
+    const bool as_in_paper = options.method == Method::Paper && options.delaunay == UpdateStrategy::Auto;
+    return as_in_paper ? UpdateStrategy::Lazy : options.delaunay;
+}
 
-    UpdateStrategy strategy() const {
-        const bool as_in_paper = options.method == Method::Paper && options.delaunay == UpdateStrategy::Auto;
-        return as_in_paper ? UpdateStrategy::Lazy : options.delaunay;
-    }
+std::optional<double> Tracker::Impl::flips_within(const SizingLimits& l) const {
+    if (options.method == Method::Paper) return std::nullopt;
+    return kCertified * l.tolerance;
+}
 
-    /// What flips may leave of the tolerance; in the paper's method it has no say.
-    std::optional<double> flips_within(const SizingLimits& l) const {
-        if (options.method == Method::Paper) return std::nullopt;
-        return kCertified * l.tolerance;
-    }
+void Tracker::Impl::arrange() {
+    std::vector<int> order(particles.size());
+    std::iota(order.begin(), order.end(), 0);
+    sort_along_curve(particles.position, order);
+    particles.reorder(order);
+    last_mesh.grow(particles.size());
+    last_mesh.reorder(order);
+    in_dt.clear();
+    first_astray = next_id;
+}
 
-    /// Puts those next to each other in memory that are so in space: what looks at neighbours takes a third
-    /// less time then.
-    void arrange() {
-        std::vector<int> order(particles.size());
-        std::iota(order.begin(), order.end(), 0);
-        sort_along_curve(particles.position, order);
-        particles.reorder(order);
-        last_mesh.grow(particles.size());
-        last_mesh.reorder(order);
-        in_dt.clear();
-        first_astray = next_id;
-    }
-    bool astray() const {
-        const auto count = std::count_if(particles.id.begin(), particles.id.end(),
-                                         [&](Id id) { return id >= first_astray; });
-        return static_cast<double>(count) > kAstray * static_cast<double>(particles.size());
-    }
+bool Tracker::Impl::astray() const {
+    const auto count =
+        std::count_if(particles.id.begin(), particles.id.end(), [&](Id id) { return id >= first_astray; });
+    return static_cast<double>(count) > kAstray * static_cast<double>(particles.size());
+}
 
-    /// Brings the DT to the particles. `moved`: what was known of its cells does not hold any more.
-    /// `meanwhile` runs beside it, which keeps little more than one thread busy, and may read the particles.
-    void tetrahedralise(bool moved, std::map<std::string, double>& seconds,
-                        const std::function<void()>& meanwhile = {}) {
-        round_to_float(particles);
-        tbb::task_group beside;
-        if (meanwhile) beside.run(meanwhile);
-        {
-            const StageTimer timer(seconds, "delaunay");
-            if (moved) labels.clear();
-            bring_dt(moved);
-        }
-        const StageTimer timer(seconds, "certify");
-        beside.wait();
+void Tracker::Impl::tetrahedralise(bool moved, std::map<std::string, double>& seconds,
+                                   const std::function<void()>& meanwhile) {
+    round_to_float(particles);
+    tbb::task_group beside;
+    if (meanwhile) beside.run(meanwhile);
+    {
+        const StageTimer timer(seconds, "delaunay");
+        if (moved) labels.clear();
+        bring_dt(moved);
     }
-    void bring_dt(bool moved) {
-        if (in_dt.empty()) {
-            dt->assign(particles.position);
-        } else {
-            // Those that are left are in their old order, the newborn behind them.
-            std::size_t next = 0;
-            for (std::size_t v = 0; v < in_dt.size(); ++v) {
-                if (next == particles.size() || particles.id[next] != in_dt[v]) {
-                    dt->remove(static_cast<int>(v));
-                    continue;
-                }
-                if (moved) dt->move(static_cast<int>(v), particles.position[next]);
-                ++next;
+    const StageTimer timer(seconds, "certify");
+    beside.wait();
+}
+
+void Tracker::Impl::bring_dt(bool moved) {
+    if (in_dt.empty()) {
+        dt->assign(particles.position);
+    } else {
+        // Those that are left are in their old order, the newborn behind them.
+        std::size_t next = 0;
+        for (std::size_t v = 0; v < in_dt.size(); ++v) {
+            if (next == particles.size() || particles.id[next] != in_dt[v]) {
+                dt->remove(static_cast<int>(v));
+                continue;
             }
-            for (; next < particles.size(); ++next) dt->insert(particles.position[next], -1);
-            dt->compact();
+            if (moved) dt->move(static_cast<int>(v), particles.position[next]);
+            ++next;
         }
-        in_dt = particles.id;
+        for (; next < particles.size(); ++next) dt->insert(particles.position[next], -1);
+        dt->compact();
     }
+    in_dt = particles.id;
+}
 
-    /// The mesh of the DT as it is, before any fit.
-    FrameMesh carve_mesh(const Surface& surface, std::map<std::string, double>& seconds) {
-        const StageTimer timer(seconds, "convect");
-        std::vector<int> changed = dt->take_changed();
-        const Tetrahedra& cells = dt->cells();
-        if (labels.empty()) {
-            changed.resize(cells.size());
-            std::iota(changed.begin(), changed.end(), 0);
-        }
-        if (options.reconstruction == Reconstruction::Pure)
-            labels = pure_convection(cells, particles.position);
-        else
-            update_labels(labels, changed, cells, particles.position, particles.normal, surface,
-                          detail_of(options, surface));
-        return mesh_of(labels, surface);
+FrameMesh Tracker::Impl::carve_mesh(const Surface& surface, std::map<std::string, double>& seconds) {
+    const StageTimer timer(seconds, "convect");
+    std::vector<int> changed = dt->take_changed();
+    const Tetrahedra& cells = dt->cells();
+    if (labels.empty()) {
+        changed.resize(cells.size());
+        std::iota(changed.begin(), changed.end(), 0);
     }
+    if (options.reconstruction == Reconstruction::Pure)
+        labels = pure_convection(cells, particles.position);
+    else
+        update_labels(labels, changed, cells, particles.position, particles.normal, surface,
+                      detail_of(options, surface));
+    return mesh_of(labels, surface);
+}
 
-    /// Carves labels, which change where they are untangled.
-    FrameMesh mesh_of(CellLabels& of_cells, const Surface& surface) const {
-        const Tetrahedra& cells = dt->cells();
-        FrameMesh mesh;
+FrameMesh Tracker::Impl::mesh_of(CellLabels& of_cells, const Surface& surface) const {
+    const Tetrahedra& cells = dt->cells();
+    FrameMesh mesh;
+    mesh.carved = carve(cells, of_cells, particles.position);
+    if (options.reconstruction == Reconstruction::Guided &&
+        untangle(of_cells, cells, particles.position, surface, mesh.carved, detail_of(options, surface)))
         mesh.carved = carve(cells, of_cells, particles.position);
-        if (options.reconstruction == Reconstruction::Guided &&
-            untangle(of_cells, cells, particles.position, surface, mesh.carved, detail_of(options, surface)))
-            mesh.carved = carve(cells, of_cells, particles.position);
-        mesh.vertices.reserve(mesh.carved.particle.size());
-        std::size_t midpoint = 0;
-        for (const int p : mesh.carved.particle)
-            mesh.vertices.push_back(p >= 0 ? particles.position[p]
-                                           : to_float_precision(mesh.carved.midpoints[midpoint++]));
-        mesh.on_surface = mesh.vertices;
-        return mesh;
-    }
+    mesh.vertices.reserve(mesh.carved.particle.size());
+    std::size_t midpoint = 0;
+    for (const int p : mesh.carved.particle)
+        mesh.vertices.push_back(p >= 0 ? particles.position[p]
+                                       : to_float_precision(mesh.carved.midpoints[midpoint++]));
+    mesh.on_surface = mesh.vertices;
+    return mesh;
+}
 
-    Densifier make_densifier(const Surface& surface, const SizingLimits& l, std::size_t crossings) {
-        const double finer = std::max(1.0, 0.5 * surface.resolution() / l.tolerance);
-        const auto most =
-            kMostAnyway + static_cast<std::size_t>(kMostPerCrossing * finer * static_cast<double>(crossings));
-        const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
-        return {particles, surface, l.detail, least, l.max_edge, most, next_id};
-    }
+Densifier Tracker::Impl::make_densifier(const Surface& surface, const SizingLimits& l,
+                                        std::size_t crossings) {
+    const double finer = std::max(1.0, 0.5 * surface.resolution() / l.tolerance);
+    const auto most =
+        kMostAnyway + static_cast<std::size_t>(kMostPerCrossing * finer * static_cast<double>(crossings));
+    const double least = options.min_edge.value_or(kLeastSpacing * surface.resolution());
+    return {particles, surface, l.detail, least, l.max_edge, most, next_id};
+}
 
-    /// The newborn move like the neighbours that were there before, or like those of these; farther from all
-    /// of them they rest.
-    void inherit_velocities(const std::vector<Triangle>& triangles) {
-        std::vector<char> moves(particles.size());
+void Tracker::Impl::inherit_velocities(const std::vector<Triangle>& triangles) {
+    std::vector<char> moves(particles.size());
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+        moves[i] = particles.id[i] < first_of_frame;
+        if (!moves[i]) particles.velocity[i].setZero();
+    }
+    bool any = true;
+    for (int layer = 0; any && layer < kMostLayers; ++layer) {
+        any = false;
+        std::vector<int> count(particles.size(), 0);
+        for (const Triangle& t : triangles)
+            for (const int i : t)
+                for (const int j : t) {
+                    if (moves[i] || !moves[j]) continue;
+                    particles.velocity[i] += particles.velocity[j];
+                    ++count[i];
+                }
         for (std::size_t i = 0; i < particles.size(); ++i) {
-            moves[i] = particles.id[i] < first_of_frame;
-            if (!moves[i]) particles.velocity[i].setZero();
-        }
-        bool any = true;
-        for (int layer = 0; any && layer < kMostLayers; ++layer) {
-            any = false;
-            std::vector<int> count(particles.size(), 0);
-            for (const Triangle& t : triangles)
-                for (const int i : t)
-                    for (const int j : t) {
-                        if (moves[i] || !moves[j]) continue;
-                        particles.velocity[i] += particles.velocity[j];
-                        ++count[i];
-                    }
-            for (std::size_t i = 0; i < particles.size(); ++i) {
-                if (count[i] == 0) continue;
-                any = true;
-                particles.velocity[i] /= count[i];
-                moves[i] = 1;
-            }
+            if (count[i] == 0) continue;
+            any = true;
+            particles.velocity[i] /= count[i];
+            moves[i] = 1;
         }
     }
-
-    void follow(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
-                const Pace& pace, bool warm, TrackedFrame& frame);
-    std::vector<char> restless(double detail) const;
-    void make_room(const Surface& surface, TrackedFrame& frame);
-    void measure(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
-    void seed(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, double apart,
-              TrackedFrame& frame);
-    void sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, bool warm,
-                TrackedFrame& frame);
-    void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
-    void place_particles(const Motion& motion, FrameWork& work);
-    void name_vertices(const FrameMesh& mesh, TriangleMesh& named);
-    class Making;
-    Finish begin(const Surface& surface, const Motion& motion);
-};
+}
 
 /// Meshes the particles, and measures what the next births and deaths go by.
 void Tracker::Impl::measure(const Surface& surface, const SizingLimits& l, TrackedFrame& frame) {
@@ -389,213 +330,6 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
     const CoordinateDescentReport report = coordinate_descent(particles, structure, surface, l, next_id, o);
     frame.sweeps = static_cast<int>(report.steps / std::max<std::size_t>(1, count));
     frame.relocated = structure.dt().profile().relocated;
-}
-
-/// A frame on its way from particles in place to a mesh that passes. All references must outlive it.
-class Tracker::Impl::Making {
-public:
-    Making(Impl& tracker, FrameWork& work) : tracker_(tracker), work_(work) {
-        work.inspector.emplace(work.surface, work.limits, *work.crossings);
-    }
-
-    /// Meshes the particles. Once, when many have to be added, their surroundings make room for them.
-    void mesh_particles();
-    /// Adds particles, and changes labels, until the mesh passes or nothing more can be done. The topology,
-    /// which takes longer to look at, is looked at when all else passes, and so is what lies between
-    /// crossings.
-    void certify();
-    /// Exchanges parts of the mesh for those of the lattice, with no more vertices than they need; all of it
-    /// where it fails nearly everywhere.
-    void patch();
-    /// Whether the mesh is that of the particles, whatever parts of it were exchanged.
-    bool is_of_particles() const { return is_of_particles_; }
-
-private:
-    const TrackerOptions& options() const { return tracker_.options; }
-    Particles& particles() { return tracker_.particles; }
-    const Tetrahedra& cells() const { return tracker_.dt->cells(); }
-    bool in_paper() const { return options().method == Method::Paper; }
-    bool guided() const { return !in_paper() && options().reconstruction == Reconstruction::Guided; }
-
-    void make_mesh();
-    void inspect_both_ways() {
-        work_.inspection = {};  // first: there are many errors
-        work_.inspection = work_.inspector->inspect_both_ways(work_.mesh);
-    }
-    /// Where nothing is thin the nodes of the lattice need not be looked at: the Euler number tells.
-    bool is_thick() const;
-    bool has_topology() const {
-        return guided() && is_thick() && work_.surface.lattice_euler() == euler_of(work_.mesh);
-    }
-    /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
-    std::size_t mend() {
-        return densifier_->add(
-            shortages(work_.mesh, work_.inspection, cells(), particles(), work_.surface, work_.limits));
-    }
-    /// Whether nothing is added and no label changes.
-    bool passes();
-    void insert_added();
-    void mend_components();  // which may find more that is missed
-
-    Impl& tracker_;
-    FrameWork& work_;
-    Fitted fitted_;
-    std::optional<Densifier> densifier_;  // none in the paper's method, which mends nothing
-    std::size_t added_ = 0;
-    int relabellings_ = 0;
-    bool is_of_particles_ = true;
-};
-
-void Tracker::Impl::Making::make_mesh() {
-    auto& seconds = work_.frame.seconds;
-    work_.mesh = {};
-    work_.mesh = tracker_.carve_mesh(work_.surface, seconds);
-    if (!options().fit) return;
-    const StageTimer timer(seconds, "fit");
-    fitted_.fit_vertices(work_.mesh, particles().size(), work_.surface, tracker_.flips_within(work_.limits));
-}
-
-bool Tracker::Impl::Making::is_thick() const {
-    const double least = std::max(kThick * work_.limits.tolerance, kThickNodes * work_.surface.resolution());
-    const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
-    return std::all_of(thickness.begin(), thickness.end(), [&](double thick) { return thick > least; });
-}
-
-void Tracker::Impl::Making::mesh_particles() {
-    Inspector& inspector = *work_.inspector;
-    LastMesh& last_mesh = tracker_.last_mesh;
-    for (int mending = 0;; ++mending) {
-        std::function<void()> measure_expected;
-        if (!options().fit && !in_paper())
-            measure_expected = inspector.expect(particles().position, last_mesh.triangles);
-        tracker_.tetrahedralise(true, work_.frame.seconds, [&] {
-            if (measure_expected) measure_expected();
-            if (!is_thick()) inspector.prepare_topology();
-        });
-        // The last mesh is of no more use, and the most memory is needed from now on.
-        last_mesh.take({}, particles().size());
-        make_mesh();
-        const StageTimer timer(work_.frame.seconds, "certify");
-        if (in_paper()) break;
-        work_.inspection =
-            mending == 0 ? inspector.inspect(work_.mesh) : inspector.inspect_both_ways(work_.mesh);
-        densifier_.emplace(tracker_.make_densifier(work_.surface, work_.limits, work_.crossings->size()));
-        added_ = mend();
-        if (mending == kMostMendings ||
-            static_cast<double>(added_) < kFew * static_cast<double>(particles().size()))
-            break;
-        // What is known of this mesh has no use any more.
-        work_.inspection = {};
-        inspector.restart();
-        densifier_.reset();
-        fitted_ = {};
-        work_.mesh = {};
-        tracker_.make_room(work_.surface, work_.frame);
-    }
-}
-
-void Tracker::Impl::Making::insert_added() {
-    // A fitted mesh fails elsewhere than its particles do; of a DT built anew all cells are new.
-    const bool refines = !options().fit && guided() && options().delaunay != UpdateStrategy::Rebuild;
-    auto& seconds = work_.frame.seconds;
-    tracker_.tetrahedralise(false, seconds);
-    if (refines) {
-        const StageTimer timer(seconds, "certify");
-        refine(*tracker_.dt, tracker_.labels, particles(), *densifier_, work_.surface, work_.limits);
-        tracker_.in_dt = particles().id;
-    }
-    make_mesh();
-}
-
-bool Tracker::Impl::Making::passes() {
-    if (mend() > 0) return false;
-    if (options().reconstruction != Reconstruction::Guided || relabellings_ == kMostRelabellings) return true;
-    ++relabellings_;
-    CellLabels& labels = tracker_.labels;
-    return reach_out(labels, cells(), work_.mesh, work_.inspection, particles(), work_.surface,
-                     work_.limits) == 0 &&
-           relabel(labels, cells(), work_.mesh, work_.inspection, particles(), work_.surface, work_.limits) ==
-               0;
-}
-
-void Tracker::Impl::Making::mend_components() {
-    FrameMesh& mesh = work_.mesh;
-    Inspection& inspection = work_.inspection;
-    if (guided()) {
-        const Carve carve_labels = [&](CellLabels& of_cells) {
-            FrameMesh other = tracker_.mesh_of(of_cells, work_.surface);
-            if (!options().fit) return other;
-            Fitted its_own = fitted_;
-            its_own.fit_vertices(other, particles().size(), work_.surface,
-                                 tracker_.flips_within(work_.limits));
-            its_own.undo_crossing(other, particles().size());
-            return other;
-        };
-        MeshTrials trials(mesh, inspection, *work_.inspector, work_.limits);
-        if (join_specks(trials, tracker_.labels, carve_labels, cells(), particles(), work_.surface,
-                        work_.limits) > 0)
-            tracker_.last_mesh.take(mesh.carved, particles(), cells());
-    }
-    const std::vector<std::vector<Vec3>> lost = inspection.topology.lost;
-    remove_specks(mesh, inspection, *work_.inspector, work_.limits);
-    if (guided() && !options().min_edge)
-        put_in_drops(lost, mesh, inspection, *work_.inspector, work_.surface);
-}
-
-void Tracker::Impl::Making::certify() {
-    FrameMesh& mesh = work_.mesh;
-    Inspection& inspection = work_.inspection;
-    Inspector& inspector = *work_.inspector;
-    int trials = 0;
-    for (int round = 0;; ++round) {
-        if (round > 0 || added_ > 0) insert_added();
-        const StageTimer timer(work_.frame.seconds, "certify");
-        const bool last = in_paper() || round == kCertifyRounds;
-        const auto passes_or_last = [&] { return last || passes(); };
-        inspect_both_ways();
-        if (!passes_or_last()) continue;
-        if (options().fit && fitted_.undo_crossing(mesh, particles().size())) {
-            inspect_both_ways();
-            if (!passes_or_last()) continue;
-        }
-        inspector.look_between(mesh, inspection);
-        tracker_.last_mesh.take(mesh.carved, particles(), cells());
-        const bool known = has_topology();
-        if (!known) inspector.inspect_topology(mesh, inspection);
-        if (!passes_or_last()) continue;
-        if (known) return;
-        mend_components();
-        if (last || ++trials == kMostTrials || inspection.missed.empty() || mend() == 0) return;
-    }
-}
-
-void Tracker::Impl::Making::patch() {
-    fitted_ = {};  // of no more use
-    densifier_.reset();
-    if (!guided() || options().min_edge) return;
-    const StageTimer timer(work_.frame.seconds, "certify");
-    const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
-    MeshTrials of_mesh(work_.mesh, work_.inspection, *work_.inspector, work_.limits);
-    const bool fails_much = fails_at_many(of_mesh, work_.surface);
-    if (fails_much) {
-        std::vector<double> errors =
-            errors_at_particles(work_.mesh, *work_.inspection.errors, particles().size());
-        if (take_lattice_mesh(of_mesh, work_.surface, work_.limits)) {
-            is_of_particles_ = false;
-            tracker_.last_mesh.evidence.error = std::move(errors);
-            work_.inspector->look_off_surface(work_.mesh, work_.inspection);
-            return;
-        }
-    }
-    if (fails_much) mend_in_batches(of_mesh, work_.surface);
-    if (!has_topology()) {
-        if (work_.inspection.topology.speck.size() != work_.mesh.carved.triangles.size())
-            work_.inspector->inspect_topology(work_.mesh, work_.inspection);
-        patch_topology(of_mesh, thickness, work_.surface);
-    }
-    work_.inspector->look_off_surface(work_.mesh, work_.inspection);
-    if (!fails_much) patch_failing(of_mesh, thickness, work_.surface);
-    lighten_patches(of_mesh, work_.surface, work_.limits);
 }
 
 /// Brings the particles to the surface, and their number and spacing to what it wants.
