@@ -169,6 +169,23 @@ void expect_sound(const TriangleMesh& mesh, const MeshTopology& wanted) {
     EXPECT_TRUE(self_intersections(mesh).empty());
 }
 
+/// Tracks a surface that rests, cold and warm, with and without the fit; `expect(result, tracker, frame)`.
+template <typename Expect>
+void expect_in_two_frames(const LevelSet& surface, const MeshTopology& wanted, const Expect& expect) {
+    for (const bool fit : {false, true}) {
+        SCOPED_TRACE(fit ? "--fit" : "plain");
+        TrackerOptions options;
+        options.tolerance = 0.5;
+        options.fit = fit;
+        Tracker tracker(options);
+        for (int frame = 0; frame < 2; ++frame) {
+            const TrackedFrame result = tracker.advance(surface);
+            expect_sound(result.mesh, wanted);
+            expect(result, tracker, frame);
+        }
+    }
+}
+
 class Topology : public ::testing::TestWithParam<Solid> {};
 
 TEST_P(Topology, IsThatOfTheLevelSet) {
@@ -178,19 +195,10 @@ TEST_P(Topology, IsThatOfTheLevelSet) {
         EXPECT_EQ(wanted.components, GetParam().components);
         EXPECT_EQ(wanted.euler, GetParam().euler);
     }
-    for (const bool fit : {false, true}) {
-        SCOPED_TRACE(fit ? "--fit" : "plain");
-        TrackerOptions options;
-        options.tolerance = 0.5;
-        options.fit = fit;
-        Tracker tracker(options);
-        for (int frame = 0; frame < 2; ++frame) {  // cold, and warm
-            const TrackedFrame result = tracker.advance(surface);
-            expect_sound(result.mesh, wanted);
-            EXPECT_TRUE(result.within_tolerance) << result.max_error << ", lost " << result.lost_crossings;
-            EXPECT_EQ(facing_away(result.mesh, surface), 0u);
-        }
-    }
+    expect_in_two_frames(surface, wanted, [&](const TrackedFrame& result, const Tracker&, int) {
+        EXPECT_TRUE(result.within_tolerance) << result.max_error << ", lost " << result.lost_crossings;
+        EXPECT_EQ(facing_away(result.mesh, surface), 0u);
+    });
 }
 
 /// Nodes inside and outside at random: nothing that particles could follow.
@@ -210,26 +218,20 @@ TEST(TopologyOfNoise, IsThatOfTheLattice) {
             }
     const LevelSet surface(grid);
     const MeshTopology wanted = mesh_topology(volume_to_mesh(surface));
-    for (const bool fit : {false, true}) {
-        SCOPED_TRACE(fit ? "--fit" : "plain");
-        TrackerOptions options;
-        options.tolerance = 0.5;
-        options.fit = fit;
-        Tracker tracker(options);
-        std::set<Id> ids;
-        std::size_t vertices = 0;
-        for (int frame = 0; frame < 2; ++frame) {
-            const TrackedFrame result = tracker.advance(surface);
-            expect_sound(result.mesh, wanted);
-            EXPECT_EQ(result.lost_crossings, 0u);
-            // No vertex stands on a particle, and none has the id of another.
-            for (const Id id : tracker.particles().id) EXPECT_EQ(ids.count(id), 0u);
-            ids.insert(result.mesh.ids.begin(), result.mesh.ids.end());
-            for (const Id id : tracker.particles().id) EXPECT_EQ(ids.count(id), 0u);
-            vertices += result.mesh.points.size();
-            EXPECT_EQ(ids.size(), vertices);
+    std::set<Id> ids;  // of all frames so far
+    std::size_t vertices = 0;
+    expect_in_two_frames(surface, wanted, [&](const TrackedFrame& result, const Tracker& tracker, int frame) {
+        if (frame == 0) {
+            ids.clear();
+            vertices = 0;
         }
-    }
+        EXPECT_EQ(result.lost_crossings, 0u);
+        // No vertex stands on a particle, and none has the id of another.
+        ids.insert(result.mesh.ids.begin(), result.mesh.ids.end());
+        vertices += result.mesh.points.size();
+        EXPECT_EQ(ids.size(), vertices);
+        for (const Id id : tracker.particles().id) EXPECT_EQ(ids.count(id), 0u);
+    });
 }
 
 /// A cube turned in space, with a ball beside it.
