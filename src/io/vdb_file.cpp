@@ -21,6 +21,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "io/system_memory.h"
 #include "io/vdb_tree_check.h"
 #include "isotrack/error.h"
 
@@ -128,7 +129,7 @@ std::optional<VdbValueLayout> layout_of(const Record& record) {
 /// Lets a stream read from memory without a copy.
 class MemoryBuffer : public std::streambuf {
 public:
-    explicit MemoryBuffer(const std::string& bytes) {
+    explicit MemoryBuffer(std::string_view bytes) {
         char* begin = const_cast<char*>(bytes.data());  // a get area is never written to
         setg(begin, begin, begin + bytes.size());
     }
@@ -176,7 +177,7 @@ private:
     void read_transform(Record& record);
     openvdb::MetaMap read_metadata(const std::string& owner);
     void read_entry(openvdb::MetaMap& metadata, const std::string& name, const std::string& type);
-    std::string tree_bytes(const Record& record);
+    SystemMemory tree_bytes(const Record& record);
     openvdb::GridBase::Ptr read_voxels(const Record& record);
 
     std::int64_t position() { return static_cast<std::int64_t>(stream_.tellg()); }
@@ -354,7 +355,8 @@ void VdbFile::find_streamed_grids() {
         Record& last = grids_.back();
         const std::optional<VdbValueLayout> layout = layout_of(last);
         if (!layout || !last.transform) return;  // where the next grid begins is not known
-        const std::size_t length = last.parent.empty() ? check_vdb_tree(tree_bytes(last), 0, *layout) : 0;
+        const std::size_t length =
+            last.parent.empty() ? check_vdb_tree(tree_bytes(last).view(), 0, *layout) : 0;
         last.end_pos = last.tree_pos + static_cast<std::int64_t>(length);
         stream_.seekg(last.end_pos);
         Record next = read_descriptor(i);
@@ -365,10 +367,10 @@ void VdbFile::find_streamed_grids() {
     }
 }
 
-std::string VdbFile::tree_bytes(const Record& record) {
+SystemMemory VdbFile::tree_bytes(const Record& record) {
     limit_ = size_;
     stream_.seekg(record.tree_pos);
-    std::string bytes(static_cast<std::size_t>(record.end_pos - record.tree_pos), '\0');
+    SystemMemory bytes(static_cast<std::size_t>(record.end_pos - record.tree_pos));
     stream_.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     return bytes;
 }
@@ -402,9 +404,9 @@ openvdb::GridBase::Ptr VdbFile::read_voxels(const Record& record) {
     grid->setTransform(record.transform);
     if (!record.parent.empty()) return grid;
 
-    const std::string bytes = tree_bytes(record);
-    check_vdb_tree(bytes, 0, *layout);
-    MemoryBuffer buffer(bytes);
+    const SystemMemory bytes = tree_bytes(record);
+    check_vdb_tree(bytes.view(), 0, *layout);
+    MemoryBuffer buffer(bytes.view());
     std::istream stream(&buffer);
     stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
     auto stream_metadata =
