@@ -58,11 +58,16 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     if (crossings.size == 0) return;
     const std::size_t columns = first_.size() - 1;
     // Each goes to the next free place of its column, in any order: they are sorted then. To make them takes
-    // longer than anything else here, so they are held twice; a frame needs its most memory later.
-    std::vector<Entry> made(crossings.size);
+    // longer than anything else here, so they are held twice; a frame needs its most memory later. At first
+    // in blocks, which find room between what there is.
+    constexpr std::size_t kBlock = 4096;
+    std::vector<std::vector<Entry>> blocks;
+    for (std::size_t c = 0; c < crossings.size; c += kBlock)
+        blocks.emplace_back(std::min(kBlock, crossings.size - c));
+    const auto made = [&](std::size_t c) -> Entry& { return blocks[c / kBlock][c % kBlock]; };
     std::vector<std::atomic<std::uint32_t>> next(columns);
     Directions directions;
-    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, 4096);
+    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, kBlock);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         std::vector<std::pair<Eigen::Vector3f, std::uint32_t>> known;
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
@@ -72,9 +77,10 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
             if (direction == known.end())
                 direction =
                     known.insert(known.end(), {crossing.outward, directions.number_of(crossing.outward)});
-            made[c] = {(crossing.point - origin_).cast<float>(), direction->second,
-                       static_cast<std::uint32_t>(crossing.stands_for), crossing.flat};
-            next[column_of(made[c].offset)].fetch_add(1, std::memory_order_relaxed);
+            Entry& entry = made(c);
+            entry = {(crossing.point - origin_).cast<float>(), direction->second,
+                     static_cast<std::uint32_t>(crossing.stands_for), crossing.flat};
+            next[column_of(entry.offset)].fetch_add(1, std::memory_order_relaxed);
         }
     });
     crossings.at = nullptr;  // which frees the list behind it, if there is one
@@ -93,9 +99,9 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     entries_.resize(crossings.size);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
-            const std::size_t column = column_of(made[c].offset);
+            const std::size_t column = column_of(made(c).offset);
             Entry& entry = entries_[first_[column] + next[column].fetch_add(1, std::memory_order_relaxed)];
-            entry = made[c];
+            entry = made(c);
             entry.direction = sorted[entry.direction];
         }
     });
