@@ -200,18 +200,16 @@ bool IncrementalDelaunay::start(const std::vector<int>& order, std::array<int, 4
 }
 
 void IncrementalDelaunay::build(std::vector<int>& chosen) {
-    cells_.vertices.clear();
-    cells_.links.clear();
-    marks_.clear();
+    constexpr std::size_t kCells = 7;  // per vertex of a sampled surface, about
+    const std::size_t cells = kCells * chosen.size();
+    clear_for(cells_.vertices, cells);
+    clear_for(cells_.links, cells);
+    clear_for(marks_, cells);
     free_.clear();
     std::vector<int> order = chosen;
     sort_spatially(points, order);
     std::array<int, 4> first;
     if (!start(order, first)) return;
-    constexpr std::size_t kCells = 7;  // per vertex of a sampled surface, about
-    cells_.vertices.reserve(kCells * order.size());
-    cells_.links.reserve(kCells * order.size());
-    marks_.reserve(kCells * order.size());
     int near = 0;
     std::vector<int> twice;
     for (const int v : order) {
@@ -247,21 +245,21 @@ void IncrementalDelaunay::arrange() {
         if (marks_[c] == kUnseen) ++next[key(c) + 1];
     std::partial_sum(next.begin(), next.end(), next.begin());
     std::vector<int> number(slots);
+    const auto count = static_cast<int>(slots - free_.size());
+    int behind = count;  // the free ones
+    for (std::size_t c = 0; c < slots; ++c) number[c] = marks_[c] == kUnseen ? next[key(c)]++ : behind++;
+    for (auto& links : cells_.links)
+        for (int& link : links) link = Tetrahedra::link(number[link >> 2], link & 3);
+    // In place: with its arrays twice a DT would take its most memory here, and find other places each time.
     for (std::size_t c = 0; c < slots; ++c)
-        if (marks_[c] == kUnseen) number[c] = next[key(c)]++;
-    // One array after the other: with both twice a DT would take its most memory here.
-    const std::size_t count = slots - free_.size();
-    const auto move = [&](std::vector<std::array<int, 4>>& values, const auto& renamed) {
-        std::vector<std::array<int, 4>> result;
-        reserve_with_slack(result, count);
-        result.resize(count);
-        for (std::size_t c = 0; c < slots; ++c)
-            if (marks_[c] == kUnseen)
-                for (int k = 0; k < 4; ++k) result[number[c]][k] = renamed(values[c][k]);
-        values.swap(result);
-    };
-    move(cells_.vertices, [](int vertex) { return vertex; });
-    move(cells_.links, [&](int link) { return Tetrahedra::link(number[link >> 2], link & 3); });
+        while (number[c] != static_cast<int>(c)) {
+            const int to = number[c];
+            std::swap(cells_.vertices[c], cells_.vertices[to]);
+            std::swap(cells_.links[c], cells_.links[to]);
+            std::swap(number[c], number[to]);
+        }
+    cells_.vertices.resize(count);
+    cells_.links.resize(count);
     marks_.assign(cells_.size(), kUnseen);
     free_.clear();
 }
