@@ -18,7 +18,7 @@ namespace {
 /// `list(i, found)`, called by several threads, appends the neighbours of i to the end of `found`, ascending.
 template <typename List>
 Adjacency from_lists(std::size_t count, const List& list) {
-    constexpr std::size_t kBlock = 1024;
+    constexpr std::size_t kBlock = 256;  // lists are long, and what a thread holds of them it keeps
     Adjacency result;
     result.first.resize(count + 1);
     result.adjacent =

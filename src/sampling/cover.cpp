@@ -84,6 +84,7 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     }
 
     std::vector<std::pair<std::uint64_t, int>> order;
+    order.reserve(std::count_if(covered.begin(), covered.end(), [](const auto& c) { return c == 0; }));
     for (std::size_t c = 0; c < grid.size(); ++c)
         if (!covered[c]) order.emplace_back(mix(seed ^ mix(c)), static_cast<int>(c));
     // Seeds are found side by side, a batch at a time; those that another of the batch covers were in vain.

@@ -276,6 +276,7 @@ Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
             since_look_->crossings.insert(since_look_->crossings.end(), changed->begin(), changed->end());
         take_missed(d, result);
     }
+    changes_ = {};  // of no more use
     return result;
 }
 
