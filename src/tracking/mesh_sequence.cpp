@@ -4,6 +4,9 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <boost/asio/packaged_task.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/thread_pool.hpp>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -250,9 +253,14 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
     const auto skipped = [&](const InputFrame& frame) {
         return options.on_existing == OnExisting::Skip && fs::exists(expand_pattern(output, frame.number));
     };
+
+    // Writes a frame and then reads the next but one, while that between them is tracked: two grids at once,
+    // not three. In one thread: another would keep for itself what is freed there.
+    boost::asio::thread_pool beside(1);
     const auto start_reading = [&](std::size_t i) {
         if (i >= input.frames.size() || skipped(input.frames[i])) return std::future<ReadFrame>();
-        return std::async(std::launch::async, read_frame, input.frames[i].path, std::cref(options));
+        return boost::asio::post(beside, std::packaged_task<ReadFrame()>(
+                                             [&, i] { return read_frame(input.frames[i].path, options); }));
     };
 
     /// The last frame, whose mesh is being finished and written.
@@ -339,8 +347,10 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         auto write = [row, start, per_time, finish_mesh = std::move(finish_mesh), read_seconds = read.seconds,
                       level_set = std::move(read.level_set)]() mutable {
             TrackedFrame tracked = finish_mesh();
+            finish_mesh = nullptr;  // the future would keep what it has
             for (Vec3& v : tracked.mesh.velocities) v *= per_time;
             describe(tracked, *level_set, row);
+            level_set.reset();
             row.seconds["read"] = read_seconds;
             row.seconds["total"] = seconds_since(start);
             const auto write_start = Clock::now();
@@ -348,7 +358,8 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
             row.seconds["write"] = seconds_since(write_start);
             return row;
         };
-        pending.emplace(Pending{std::move(row), std::async(std::launch::async, std::move(write))});
+        pending.emplace(Pending{
+            std::move(row), boost::asio::post(beside, std::packaged_task<FrameReport()>(std::move(write)))});
     }
     finish_pending();
     return report;
