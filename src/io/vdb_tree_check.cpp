@@ -49,9 +49,11 @@ private:
         return number<T>(take(sizeof(T)));
     }
 
+    /// Of a whole number of words.
     static std::size_t count_on(std::string_view mask) {
         std::size_t count = 0;
-        for (const char byte : mask) count += std::bitset<8>(static_cast<unsigned char>(byte)).count();
+        for (std::size_t at = 0; at < mask.size(); at += sizeof(std::uint64_t))
+            count += std::bitset<64>(number<std::uint64_t>(mask, at)).count();
         return count;
     }
 
