@@ -166,17 +166,21 @@ std::map<std::string, std::string> effective_settings(const MeshSequenceOptions&
     return s;
 }
 
-void describe(const TrackedFrame& tracked, const LevelSet& level_set, FrameReport& row) {
-    const double voxel = level_set.voxel_size();
-    const MeshTopology topology = mesh_topology(tracked.mesh);
-    row.voxel_size = voxel;
+void describe(const LevelSet& level_set, FrameReport& row) {
+    row.voxel_size = level_set.voxel_size();
     row.active_voxels = level_set.active_voxels();
+    row.surface_euler = level_set.lattice_euler();
+}
+
+/// Of a surface that is described.
+void describe(const TrackedFrame& tracked, FrameReport& row) {
+    const double voxel = row.voxel_size;
+    const MeshTopology topology = mesh_topology(tracked.mesh);
     row.particles = tracked.particles;
     row.vertices = tracked.mesh.points.size();
     row.triangles = tracked.mesh.triangles.size();
     row.components = topology.components;
     row.euler = topology.euler;
-    row.surface_euler = level_set.lattice_euler();
     row.closed = topology.closed() && topology.oriented();
     row.manifold = topology.manifold();
     row.opened = tracked.opened;
@@ -348,9 +352,10 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
                       level_set = std::move(read.level_set)]() mutable {
             TrackedFrame tracked = finish_mesh();
             finish_mesh = nullptr;  // the future would keep what it has
-            for (Vec3& v : tracked.mesh.velocities) v *= per_time;
-            describe(tracked, *level_set, row);
+            describe(*level_set, row);
             level_set.reset();
+            for (Vec3& v : tracked.mesh.velocities) v *= per_time;
+            describe(tracked, row);
             row.seconds["read"] = read_seconds;
             row.seconds["total"] = seconds_since(start);
             const auto write_start = Clock::now();

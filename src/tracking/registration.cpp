@@ -191,11 +191,12 @@ public:
     }
 
     /// From `first(k)` on a turn and a shift. Nothing where there is no answer. `solver`: that of equations
-    /// for the same pieces, or a new one.
-    Eigen::VectorXd solve(Solver& solver) const {
+    /// for the same pieces, or a new one. To be called once: it frees the entries, of which there are many.
+    Eigen::VectorXd solve(Solver& solver) {
         if (unknowns_ == 0) return right_;
         SparseMatrix matrix(unknowns_, unknowns_);
         matrix.setFromTriplets(entries_.begin(), entries_.end());
+        entries_ = std::vector<Eigen::Triplet<double>>();
         if (solver.rows() != unknowns_) solver.analyzePattern(matrix);
         solver.factorize(matrix);
         if (solver.info() != Eigen::Success) return {};
