@@ -23,6 +23,7 @@
 
 #include "io/system_memory.h"
 #include "io/vdb_tree_check.h"
+#include "io/vdb_tree_read.h"
 #include "isotrack/error.h"
 
 namespace isotrack {
@@ -125,28 +126,6 @@ std::optional<VdbValueLayout> layout_of(const Record& record) {
     layout.compression = record.compression;
     return layout;
 }
-
-/// Lets a stream read from memory without a copy.
-class MemoryBuffer : public std::streambuf {
-public:
-    explicit MemoryBuffer(std::string_view bytes) {
-        char* begin = const_cast<char*>(bytes.data());  // a get area is never written to
-        setg(begin, begin, begin + bytes.size());
-    }
-
-private:
-    pos_type seekoff(off_type offset, std::ios_base::seekdir direction, std::ios_base::openmode) override {
-        const off_type from = direction == std::ios_base::beg   ? 0
-                              : direction == std::ios_base::cur ? gptr() - eback()
-                                                                : egptr() - eback();
-        return seekpos(from + offset, std::ios_base::in);
-    }
-    pos_type seekpos(pos_type position, std::ios_base::openmode) override {
-        if (off_type(position) < 0 || off_type(position) > egptr() - eback()) return pos_type(off_type(-1));
-        setg(eback(), eback() + off_type(position), egptr());
-        return position;
-    }
-};
 
 class VdbFile {
 public:
@@ -356,7 +335,7 @@ void VdbFile::find_streamed_grids() {
         const std::optional<VdbValueLayout> layout = layout_of(last);
         if (!layout || !last.transform) return;  // where the next grid begins is not known
         const std::size_t length =
-            last.parent.empty() ? check_vdb_tree(tree_bytes(last).view(), 0, *layout) : 0;
+            last.parent.empty() ? check_vdb_tree(tree_bytes(last).view(), 0, *layout).end : 0;
         last.end_pos = last.tree_pos + static_cast<std::int64_t>(length);
         stream_.seekg(last.end_pos);
         Record next = read_descriptor(i);
@@ -405,21 +384,8 @@ openvdb::GridBase::Ptr VdbFile::read_voxels(const Record& record) {
     if (!record.parent.empty()) return grid;
 
     const SystemMemory bytes = tree_bytes(record);
-    check_vdb_tree(bytes.view(), 0, *layout);
-    MemoryBuffer buffer(bytes.view());
-    std::istream stream(&buffer);
-    stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
-    auto stream_metadata =
-        std::make_shared<openvdb::io::StreamMetadata>();  // the stream keeps a pointer to this pointer
-    openvdb::io::setStreamMetadataPtr(stream, stream_metadata, false);
-    openvdb::io::setVersion(stream, library_version_, file_version_);
-    openvdb::io::setDataCompression(stream, record.compression);
-    openvdb::io::setGridClass(stream, grid->getGridClass());
-    openvdb::io::setGridBackgroundValuePtr(stream, nullptr);
-    stream_metadata->setSeekable(true);
-    stream_metadata->setHalfFloat(grid->saveFloatAsHalf());
-    grid->readTopology(stream);
-    grid->readBuffers(stream);
+    const VdbTreeExtent extent = check_vdb_tree(bytes.view(), 0, *layout);
+    read_vdb_tree(*grid, bytes.view(), extent, {library_version_, file_version_, record.compression});
     return grid;
 }
 

@@ -20,13 +20,17 @@ public:
     TreeWalk(std::string_view bytes, std::size_t begin, const VdbValueLayout& layout)
         : bytes_(bytes), at_(begin), layout_(layout) {}
 
-    std::size_t end() {
+    VdbTreeExtent extent() {
         read_root();
-        for (const std::size_t active : leaves_) {
+        VdbTreeExtent result;
+        result.leaves.reserve(active_.size());
+        for (const std::size_t active : active_) {
+            result.leaves.push_back(at_);
             take(kLeafValues / 8);
             skip_values(kLeafValues, active);
         }
-        return at_;
+        result.end = at_;
+        return result;
     }
 
 private:
@@ -81,7 +85,7 @@ private:
             if (log2_dim == 5)
                 read_internal(4);
             else
-                leaves_.push_back(count_on(take(kLeafValues / 8)));
+                active_.push_back(count_on(take(kLeafValues / 8)));
         }
     }
 
@@ -127,13 +131,13 @@ private:
     std::string_view bytes_;
     std::size_t at_;
     VdbValueLayout layout_;
-    std::vector<std::size_t> leaves_;  ///< Active voxels of each, in the order of their buffers.
+    std::vector<std::size_t> active_;  ///< Voxels of each leaf, in the order of their buffers.
 };
 
 }  // namespace
 
-std::size_t check_vdb_tree(std::string_view bytes, std::size_t begin, const VdbValueLayout& layout) {
-    return TreeWalk(bytes, begin, layout).end();
+VdbTreeExtent check_vdb_tree(std::string_view bytes, std::size_t begin, const VdbValueLayout& layout) {
+    return TreeWalk(bytes, begin, layout).extent();
 }
 
 }  // namespace isotrack

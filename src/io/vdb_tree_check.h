@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <vector>
 
 namespace isotrack {
 
@@ -15,10 +16,16 @@ struct VdbValueLayout {
     std::uint32_t compression;  ///< OpenVDB's flags.
 };
 
+/// Where a tree is in its bytes.
+struct VdbTreeExtent {
+    std::size_t end;
+    std::vector<std::size_t> leaves;  ///< Where the values of each begin, in the order of the tree.
+};
+
 /// Walks the tree (of the usual shape 5, 4, 3; file version 222 or later) that begins at `bytes[begin]`,
 /// without decompressing it, and checks what OpenVDB 10 does not: it copies a block that says it is stored as
 /// it is into a buffer of the expected size, whatever length the block states, and it trusts the lengths
-/// inside a Blosc block. Returns where the tree ends. \throws std::runtime_error with what is wrong.
-std::size_t check_vdb_tree(std::string_view bytes, std::size_t begin, const VdbValueLayout& layout);
+/// inside a Blosc block. \throws std::runtime_error with what is wrong.
+VdbTreeExtent check_vdb_tree(std::string_view bytes, std::size_t begin, const VdbValueLayout& layout);
 
 }  // namespace isotrack

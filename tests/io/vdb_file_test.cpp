@@ -195,6 +195,60 @@ TEST_F(VdbFileTest, ReadsWhatOpenVdbReads) {
         }
 }
 
+/// Every value of a grid read here is that of the one OpenVDB reads.
+template <typename Grid>
+void expect_as_openvdb_reads(const std::string& path, const GridInfo& info) {
+    openvdb::io::File file(path);
+    file.open(false);
+    const auto reference = openvdb::gridPtrCast<Grid>(file.readGrid(info.name));
+    const auto grid = openvdb::gridPtrCast<Grid>(read_grid(path, info));
+    ASSERT_TRUE(grid);
+    ASSERT_TRUE(grid->tree().hasSameTopology(reference->tree()));
+    auto value = grid->cbeginValueAll();
+    for (auto there = reference->cbeginValueAll(); there; ++there, ++value) ASSERT_EQ(*value, *there);
+}
+
+TEST_F(VdbFileTest, ReadsManyLeavesAsOpenVdbDoes) {
+    constexpr std::size_t kManyLeaves = 1000;  // of which each thread reads some
+    const auto sphere =
+        openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(60.f, openvdb::Vec3f(3.f), 1.f);
+    ASSERT_GT(sphere->tree().leafCount(), kManyLeaves);
+    ASSERT_EQ(sphere->tree().root().childCount(), 8u);
+    sphere->setName("phi");
+    const auto doubled = openvdb::DoubleGrid::create(3.0);
+    doubled->setName("doubled");
+    const auto velocity = openvdb::Vec3SGrid::create();
+    velocity->setName("velocity");
+    for (auto value = sphere->cbeginValueOn(); value; ++value) {
+        const openvdb::Coord at = value.getCoord();
+        doubled->tree().setValue(at, 2.0 * *value);
+        velocity->tree().setValue(at, openvdb::Vec3s(*value, static_cast<float>(at.x()), 1.f));
+    }
+    for (const std::uint32_t compression :
+         {std::uint32_t{openvdb::io::COMPRESS_NONE},
+          std::uint32_t{openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK},
+          std::uint32_t{openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK}})
+        for (const bool half : {false, true}) {
+            sphere->setSaveFloatAsHalf(half);
+            write_vdb(file(), {doubled, sphere, velocity}, compression);
+            const std::vector<GridInfo> grids = list_grids(file());
+            expect_as_openvdb_reads<openvdb::DoubleGrid>(file(), grids[0]);
+            expect_as_openvdb_reads<openvdb::FloatGrid>(file(), grids[1]);
+            expect_as_openvdb_reads<openvdb::Vec3SGrid>(file(), grids[2]);
+        }
+}
+
+TEST_F(VdbFileTest, RefusesADamagedBlockAmongMany) {
+    const auto sphere =
+        openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(60.f, openvdb::Vec3f(3.f), 1.f);
+    sphere->setName("phi");
+    write_vdb(file(), {sphere}, openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+    std::string bytes = read_bytes(file());
+    bytes.replace(bytes.size() - 3000, 1500, std::string(1500, '\x5a'));  // of blocks near the end
+    const std::string path = with(bytes);
+    refusal(path, [&] { read_grid(path, list_grids(path)[0]); });
+}
+
 TEST_F(VdbFileTest, KnowsUnnamedGridsAndGridsOfOneName) {
     std::vector<openvdb::FloatGrid::Ptr> grids;
     for (const char* name : {"a", "", "a", "", "b"}) {

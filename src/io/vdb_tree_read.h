@@ -1,0 +1,26 @@
+// The tree of a VDB grid, from bytes that were checked.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <cstdint>
+#include <string_view>
+
+#include "io/vdb_tree_check.h"
+
+namespace isotrack {
+
+/// What the file says of how its trees are written.
+struct VdbTreeFormat {
+    openvdb::VersionId library_version;
+    std::uint32_t file_version;
+    std::uint32_t compression;  ///< OpenVDB's flags.
+};
+
+/// Reads the tree of `grid`, whose type, class and metadata are set, of float, double or vectors of them.
+/// `extent`: what `check_vdb_tree` says of these bytes. The values of its leaves are read by several threads
+/// of TBB, into memory that this thread allocates. \throws std::exception as OpenVDB does
+void read_vdb_tree(openvdb::GridBase& grid, std::string_view bytes, const VdbTreeExtent& extent,
+                   const VdbTreeFormat& format);
+
+}  // namespace isotrack
