@@ -1,6 +1,7 @@
 #include "surface/crossed_edges.h"
 
 #include <openvdb/tree/LeafManager.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -162,40 +163,53 @@ void for_each_edge_of(const Leaf& leaf, const LeafSides& sides, TreeReader& read
 CrossedEdges find_crossed_edges(const FloatTree& tree) {
     const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
     const std::size_t count = leaves.leafCount();
-    std::atomic<bool> finite{true};
-    const auto for_each_leaf = [&](const auto& visit) {
-        constexpr std::size_t kLeaves =
-            512;  // a thread's at least: with fewer it knows few of its neighbours
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kLeaves), [&](const auto& range) {
-            TreeReader reader(tree);
-            LeafSigns signs;
-            for (std::size_t n = range.begin(); n < range.end(); ++n) visit(n, leaves.leaf(n), reader, signs);
-            if (!signs.are_finite()) finite = false;
-        });
+    // By blocks: in each they are counted, then written, while their leaves are near at hand.
+    constexpr std::size_t kLeaves = 128;  // with fewer a thread knows few of their neighbours
+    struct Block {
+        UnsetVector<CrossedEdges::Packed> edges;
+        long cell_parts = 0;
+        std::size_t at_border = 0;
     };
-    // Counted first, so that each has its place in memory that is touched once.
+    std::vector<Block> blocks((count + kLeaves - 1) / kLeaves);
     std::vector<std::size_t> first(count + 1, 0);
-    std::vector<long> cell_parts_of(count);
-    for_each_leaf([&](std::size_t n, const Leaf& leaf, TreeReader& reader, LeafSigns& signs) {
-        const LeafSides sides(leaf, reader, signs);
-        first[n + 1] = count_edges_of(leaf, sides, reader);
-        cell_parts_of[n] = cell_parts(leaf, sides, reader);
+    tbb::enumerable_thread_specific<LeafSigns> signs_of_threads;
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+        const std::size_t begin = b * kLeaves, end = std::min(count, begin + kLeaves);
+        Block& block = blocks[b];
+        TreeReader reader(tree);
+        LeafSigns& signs = signs_of_threads.local();
+        std::size_t edges = 0;
+        for (std::size_t n = begin; n < end; ++n) {
+            const Leaf& leaf = leaves.leaf(n);
+            const LeafSides sides(leaf, reader, signs);
+            edges += first[n + 1] = count_edges_of(leaf, sides, reader);
+            block.cell_parts += cell_parts(leaf, sides, reader);
+        }
+        if (!signs.are_finite()) return;
+        block.edges.resize(edges);
+        CrossedEdges::Packed* next = block.edges.data();
+        for (std::size_t n = begin; n < end; ++n) {
+            if (first[n + 1] == 0) continue;
+            const Leaf& leaf = leaves.leaf(n);
+            for_each_edge_of(leaf, LeafSides(leaf, reader, signs), reader, [&](const CrossedEdge& edge) {
+                *next++ = {edge, leaf.origin()};
+                block.at_border += edge.at_border;
+            });
+        }
     });
     CrossedEdges result;
-    result.finite_ = finite;
-    if (!finite) return result;
+    for (const LeafSigns& signs : signs_of_threads) result.finite_ = result.finite_ && signs.are_finite();
+    if (!result.finite_) return result;
+    for (const Block& block : blocks) {
+        result.cell_parts_ += block.cell_parts;
+        result.at_border_ += block.at_border;
+    }
     std::partial_sum(first.begin(), first.end(), first.begin());
     result.packed_.resize(first.back());
-    std::atomic<std::size_t> at_border{0};
-    for_each_leaf([&](std::size_t n, const Leaf& leaf, TreeReader& reader, LeafSigns& signs) {
-        if (first[n] == first[n + 1]) return;
-        CrossedEdges::Packed* next = &result.packed_[first[n]];
-        std::size_t here = 0;
-        for_each_edge_of(leaf, LeafSides(leaf, reader, signs), reader, [&](const CrossedEdge& edge) {
-            *next++ = {edge, leaf.origin()};
-            here += edge.at_border;
-        });
-        at_border += here;
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+        std::copy(blocks[b].edges.begin(), blocks[b].edges.end(),
+                  result.packed_.begin() + static_cast<std::ptrdiff_t>(first[b * kLeaves]));
+        blocks[b].edges = UnsetVector<CrossedEdges::Packed>();
     });
     for (std::size_t n = 0; n < count; ++n)
         if (first[n] < first[n + 1])
@@ -203,8 +217,6 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
     for (std::uint32_t part = 0; part < result.parts_.size(); ++part)
         while (result.part_at_.size() * CrossedEdges::kStep < result.parts_[part].end)
             result.part_at_.push_back(part);
-    result.cell_parts_ = std::accumulate(cell_parts_of.begin(), cell_parts_of.end(), 0L);
-    result.at_border_ = at_border;
     return result;
 }
 
