@@ -193,10 +193,17 @@ int track(const TrackArguments& arguments) {
 struct FilesArguments {
     std::string input;
     double tolerance = 0.0;
+    bool fit = false;
 };
 
+/// What a file's grid takes of memory.
+double grid_mb(const std::string& path) {
+    return static_cast<double>(read_grid(path, choose_grid(list_grids(path), {}, path))->memUsage()) /
+           (1024.0 * 1024.0);
+}
+
 /// From files to files. One row: the seconds of all together, and of each of the stages that run beside each
-/// other.
+/// other; and the peak of memory above the program and two grids, of which one is read ahead.
 int files(const FilesArguments& arguments) {
     const InputSequence input = find_frames({arguments.input});
     const auto folder = std::filesystem::path(arguments.input) / "meshes";
@@ -204,10 +211,15 @@ int files(const FilesArguments& arguments) {
     MeshSequenceOptions options;
     options.tolerance = {arguments.tolerance, false};
     options.on_existing = OnExisting::Overwrite;
+    options.fit = arguments.fit;
     RunReport report;
     Json row;
+    const double program = memory_mb("RssAnon");
+    reset_peak();
     row["all"] =
         seconds_of([&] { report = mesh_sequence(input, (folder / "mesh.####.ply").string(), options); });
+    row["above_mb"] =
+        memory_mb("VmHWM") - memory_mb("RssFile") - program - 2.0 * grid_mb(input.frames.front().path);
     double particles = 0.0, read = 0.0, track = 0.0, finish = 0.0;
     for (const FrameReport& frame : report.frames) {
         particles = static_cast<double>(frame.particles);
@@ -266,6 +278,7 @@ int main(int argc, char** argv) {
     files_command->add_option("--tolerance", of_files.tolerance, "World units")
         ->required()
         ->check(CLI::PositiveNumber);
+    files_command->add_flag("--fit", of_files.fit, "As for track");
     files_command->callback([&] { result = files(of_files); });
 
     try {

@@ -28,6 +28,10 @@ track() {
 track_six() {
     track "$@" --measure 6
 }
+# run_files [OPTION...]: names and values of a run from files to files.
+run_files() {
+    "$program" files "$work/frames" --tolerance "$tolerance" "$@"
+}
 calculate() {
     LC_ALL=C awk "BEGIN { print $1 }"
 }
@@ -112,31 +116,39 @@ print_missed
 echo
 echo "Size, at about the same number of voxels between particles."
 echo
-echo "| particles | active voxels | tolerance, voxels | seconds, without read | particles per second | peak memory above the grid and the program, bytes per particle | with --fit: particles | seconds | of these the fit | particles per second | bytes per particle |"
-echo "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
+echo "| particles | active voxels | tolerance, voxels | seconds, without read | particles per second | peak memory above the grid and the program, bytes per particle | of a run from files to files, above two grids | with --fit: particles | seconds | of these the fit | particles per second | bytes per particle | of a run |"
+echo "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
 sizes="5000 16000 50000 160000"
 [ "$large" = 0 ] || sizes="$sizes 500000"
 for size in $sizes; do
     size_for "$size" --frames 8
     track_six --tolerance "$tolerance"
     cp "$work/row.csv" "$work/plain.csv"
-    track_six --tolerance "$tolerance" --fit  # a row of other columns
-    cat "$work/plain.csv" "$work/row.csv" >"$work/both.csv"
-    mv "$work/both.csv" "$work/row.csv"
+    track_six --tolerance "$tolerance" --fit  # rows of other columns
+    cp "$work/row.csv" "$work/fitted.csv"
+    run_files >"$work/run.csv"
+    run_files --fit >"$work/fitted_run.csv"
+    cat "$work/plain.csv" "$work/fitted.csv" "$work/run.csv" "$work/fitted_run.csv" >"$work/row.csv"
     evaluate -v tolerance="$(calculate "$tolerance / $voxel")" '
         NR == 3 { for (i = 1; i <= NF; i++) fitted_name[i] = $i }
         NR == 4 { for (i = 1; i <= NF; i++) fitted[fitted_name[i]] = $i }
+        NR == 5 { for (i = 1; i <= NF; i++) run_name[i] = $i }
+        NR == 6 { for (i = 1; i <= NF; i++) run[run_name[i]] = $i }
+        NR == 8 { for (i = 1; i <= NF; i++) fitted_run[run_name[i]] = $i }
+        function bytes_of(values) { return 1048576 * values["above_mb"] / values["particles"] }
         END {
             rate = value["particles"] / value["advance"]; fitted_rate = fitted["particles"] / fitted["advance"]
-            bytes = 1048576 * value["above_mb"] / value["particles"]
-            fitted_bytes = 1048576 * fitted["above_mb"] / fitted["particles"]
-            printf "| %d | %d | %.2f | %.2f | %d | %d | %d | %.2f | %.2f | %d | %d |\n", value["particles"], value["voxels"], tolerance,
-                   value["advance"], rate, bytes, fitted["particles"], fitted["advance"], fitted["fit"], fitted_rate, fitted_bytes
+            bytes = bytes_of(value); fitted_bytes = bytes_of(fitted); run_bytes = bytes_of(run); fitted_run_bytes = bytes_of(fitted_run)
+            printf "| %d | %d | %.2f | %.2f | %d | %d | %d | %d | %.2f | %.2f | %d | %d | %d |\n", value["particles"], value["voxels"],
+                   tolerance, value["advance"], rate, bytes, run_bytes, fitted["particles"], fitted["advance"], fitted["fit"], fitted_rate,
+                   fitted_bytes, fitted_run_bytes
             miss(value["not_kept"] + fitted["not_kept"] > 0, sprintf("%d particles: tolerance not kept", value["particles"]))
             miss(rate < 60000, sprintf("%d particles: %d per second", value["particles"], rate))
             miss(fitted_rate < 60000, sprintf("%d particles with --fit: %d per second", fitted["particles"], fitted_rate))
             miss(bytes > 1500, sprintf("%d particles: %d bytes each", value["particles"], bytes))
             miss(fitted_bytes > 1500, sprintf("%d particles with --fit: %d bytes each", fitted["particles"], fitted_bytes))
+            miss(run_bytes > 1500, sprintf("a run with %d particles: %d bytes each", run["particles"], run_bytes))
+            miss(fitted_run_bytes > 1500, sprintf("a run with %d particles with --fit: %d bytes each", fitted_run["particles"], fitted_run_bytes))
         }'
 done
 echo
@@ -163,7 +175,7 @@ sphere_row "perfect sphere"
 
 echo
 size_for 16000 --frames 12
-"$program" files "$work/frames" --tolerance "$tolerance" >"$work/row.csv"
+run_files >"$work/row.csv"
 evaluate '
     END {
         slowest = value["tracking"]
