@@ -19,8 +19,9 @@ void reserve_with_slack(std::vector<T>& values, std::size_t size) {
 template <typename T>
 void clear_for(std::vector<T>& values, std::size_t size) {
     constexpr std::size_t kTooMuch = 4;  // the part of it that may be too much
+    constexpr std::size_t kFew = 4096;   // or so many
     values.clear();
-    if (values.capacity() >= size && values.capacity() <= size + size / kTooMuch) return;
+    if (values.capacity() >= size && values.capacity() <= size + size / kTooMuch + kFew) return;
     std::vector<T>().swap(values);
     reserve_with_slack(values, size);
 }

@@ -21,12 +21,18 @@ public:
         if (bytes == MAP_FAILED) throw std::bad_alloc();
         bytes_.reset(static_cast<char*>(bytes));
 #ifdef MADV_HUGEPAGE
-        ::madvise(bytes, size, MADV_HUGEPAGE);  // else every 4 kB wait for the system
+        ::madvise(bytes, size, MADV_HUGEPAGE);  // else the system is asked for every 4 kB
 #endif
     }
-    char* data() const { return bytes_.get(); }
-    std::size_t size() const { return bytes_.get_deleter().size; }
-    std::string_view view() const { return {data(), size()}; }
+    char* data() const {
+        return bytes_.get();
+    }
+    std::size_t size() const {
+        return bytes_.get_deleter().size;
+    }
+    std::string_view view() const {
+        return {data(), size()};
+    }
 
 private:
     struct Unmap {

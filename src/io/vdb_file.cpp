@@ -335,7 +335,7 @@ void VdbFile::find_streamed_grids() {
         const std::optional<VdbValueLayout> layout = layout_of(last);
         if (!layout || !last.transform) return;  // where the next grid begins is not known
         const std::size_t length =
-            last.parent.empty() ? check_vdb_tree(tree_bytes(last).view(), 0, *layout).end : 0;
+            last.parent.empty() ? check_vdb_tree(tree_bytes(last).view(), *layout).end : 0;
         last.end_pos = last.tree_pos + static_cast<std::int64_t>(length);
         stream_.seekg(last.end_pos);
         Record next = read_descriptor(i);
@@ -384,7 +384,7 @@ openvdb::GridBase::Ptr VdbFile::read_voxels(const Record& record) {
     if (!record.parent.empty()) return grid;
 
     const SystemMemory bytes = tree_bytes(record);
-    const VdbTreeExtent extent = check_vdb_tree(bytes.view(), 0, *layout);
+    const VdbTreeExtent extent = check_vdb_tree(bytes.view(), *layout);
     read_vdb_tree(*grid, bytes.view(), extent, {library_version_, file_version_, record.compression});
     return grid;
 }

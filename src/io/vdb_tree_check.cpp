@@ -17,8 +17,7 @@ constexpr std::size_t kLeafValues = 512;
 
 class TreeWalk {
 public:
-    TreeWalk(std::string_view bytes, std::size_t begin, const VdbValueLayout& layout)
-        : bytes_(bytes), at_(begin), layout_(layout) {}
+    TreeWalk(std::string_view bytes, const VdbValueLayout& layout) : bytes_(bytes), layout_(layout) {}
 
     VdbTreeExtent extent() {
         read_root();
@@ -129,15 +128,15 @@ private:
     }
 
     std::string_view bytes_;
-    std::size_t at_;
+    std::size_t at_ = 0;
     VdbValueLayout layout_;
-    std::vector<std::size_t> active_;  ///< Voxels of each leaf, in the order of their buffers.
+    std::vector<std::size_t> active_;  ///< Active voxels of each leaf, in the order of their buffers.
 };
 
 }  // namespace
 
-VdbTreeExtent check_vdb_tree(std::string_view bytes, std::size_t begin, const VdbValueLayout& layout) {
-    return TreeWalk(bytes, begin, layout).extent();
+VdbTreeExtent check_vdb_tree(std::string_view bytes, const VdbValueLayout& layout) {
+    return TreeWalk(bytes, layout).extent();
 }
 
 }  // namespace isotrack

@@ -19,13 +19,14 @@ struct VdbValueLayout {
 /// Where a tree is in its bytes.
 struct VdbTreeExtent {
     std::size_t end;
-    std::vector<std::size_t> leaves;  ///< Where the values of each begin, in the order of the tree.
+    /// Where the buffer of each begins, with its mask once more, in the order of the tree.
+    std::vector<std::size_t> leaves;
 };
 
-/// Walks the tree (of the usual shape 5, 4, 3; file version 222 or later) that begins at `bytes[begin]`,
+/// Walks the tree (of the usual shape 5, 4, 3; file version 222 or later) that `bytes` begin with,
 /// without decompressing it, and checks what OpenVDB 10 does not: it copies a block that says it is stored as
 /// it is into a buffer of the expected size, whatever length the block states, and it trusts the lengths
 /// inside a Blosc block. \throws std::runtime_error with what is wrong.
-VdbTreeExtent check_vdb_tree(std::string_view bytes, std::size_t begin, const VdbValueLayout& layout);
+VdbTreeExtent check_vdb_tree(std::string_view bytes, const VdbValueLayout& layout);
 
 }  // namespace isotrack

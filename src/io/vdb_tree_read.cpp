@@ -12,7 +12,7 @@
 namespace isotrack {
 namespace {
 
-constexpr std::size_t kLeaves = 64;  // a thread's at least
+constexpr std::size_t kLeaves = 64;  // about, at the same time by one thread
 
 /// Lets a stream read from memory without a copy.
 class MemoryBuffer : public std::streambuf {
@@ -69,12 +69,14 @@ void read_vdb_tree(openvdb::GridBase& grid, std::string_view bytes, const VdbTre
         const std::size_t count = leaves.leafCount();
         if (count != extent.leaves.size()) throw std::runtime_error("its tree has other leaves than it says");
         for (std::size_t n = 0; n < count; ++n) leaves.leaf(n).buffer().allocate();
+        const bool half = grid.saveFloatAsHalf();
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kLeaves), [&](const auto& range) {
             TreeStream stream(bytes, grid, format);
             openvdb::io::setGridBackgroundValuePtr(stream.get(), &tree.background());
-            stream.get().seekg(static_cast<std::streamoff>(extent.leaves[range.begin()]));
-            for (std::size_t n = range.begin(); n < range.end(); ++n)
-                leaves.leaf(n).readBuffers(stream.get(), grid.saveFloatAsHalf());
+            for (std::size_t n = range.begin(); n < range.end(); ++n) {
+                stream.get().seekg(static_cast<std::streamoff>(extent.leaves[n]));
+                leaves.leaf(n).readBuffers(stream.get(), half);
+            }
         });
     };
     using Grids =

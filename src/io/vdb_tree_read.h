@@ -17,9 +17,10 @@ struct VdbTreeFormat {
     std::uint32_t compression;  ///< OpenVDB's flags.
 };
 
-/// Reads the tree of `grid`, whose type, class and metadata are set, of float, double or vectors of them.
-/// `extent`: what `check_vdb_tree` says of these bytes. The values of its leaves are read by several threads
-/// of TBB, into memory that this thread allocates. \throws std::exception as OpenVDB does
+/// Reads the tree, of float, double or vectors of three of them, into `grid`, whose class and metadata are
+/// set. `extent`: what `check_vdb_tree` says of these bytes. The values of leaves are read by several threads
+/// of TBB, into memory that this thread allocates. \throws std::runtime_error when it is of another type or
+/// has other leaves, and what OpenVDB does, from any thread.
 void read_vdb_tree(openvdb::GridBase& grid, std::string_view bytes, const VdbTreeExtent& extent,
                    const VdbTreeFormat& format);
 

@@ -59,7 +59,7 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     const std::size_t columns = first_.size() - 1;
     // Each goes to the next free place of its column, in any order: they are sorted then. To make them takes
     // longer than anything else here, so they are held twice; a frame needs its most memory later. At first
-    // in blocks, which find room between what there is.
+    // in blocks, which fit into holes of the heap.
     constexpr std::size_t kBlock = 4096;
     std::vector<std::vector<Entry>> blocks;
     for (std::size_t c = 0; c < crossings.size; c += kBlock)

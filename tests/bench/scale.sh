@@ -147,6 +147,7 @@ for size in $sizes; do
             miss(fitted_rate < 60000, sprintf("%d particles with --fit: %d per second", fitted["particles"], fitted_rate))
             miss(bytes > 1500, sprintf("%d particles: %d bytes each", value["particles"], bytes))
             miss(fitted_bytes > 1500, sprintf("%d particles with --fit: %d bytes each", fitted["particles"], fitted_bytes))
+            miss(run["not_kept"] + fitted_run["not_kept"] > 0, sprintf("runs with %d and %d particles: frames not ok", run["particles"], fitted_run["particles"]))
             miss(run_bytes > 1500, sprintf("a run with %d particles: %d bytes each", run["particles"], run_bytes))
             miss(fitted_run_bytes > 1500, sprintf("a run with %d particles with --fit: %d bytes each", fitted_run["particles"], fitted_run_bytes))
         }'

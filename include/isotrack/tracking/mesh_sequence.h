@@ -58,11 +58,11 @@ struct MeshSequenceEvents {
 };
 
 /// Tracks `input` and writes one mesh per frame to `output` (a pattern with a number field, or a plain path
-/// for a single frame). The next frame is read and the last one written while a frame is tracked. A frame
-/// that cannot be used becomes a row with status "failed" and its cause; the frames after it are tracked on
-/// from the last good one. The report holds a row for every input frame that was reached. \throws OptionError
-/// before any work: bad option, unknown extension, output without a number field, outputs that exist, or gaps
-/// where they are not allowed.
+/// for a single frame). While a frame is tracked the last one is written and then the next one read, so that
+/// there are two grids at once. A frame that cannot be used becomes a row with status "failed" and its cause;
+/// the frames after it are tracked on from the last good one. The report holds a row for every input frame
+/// that was reached. \throws OptionError before any work: bad option, unknown extension, output without a
+/// number field, outputs that exist, or gaps where they are not allowed.
 RunReport mesh_sequence(const InputSequence& input, const std::string& output,
                         const MeshSequenceOptions& options, const MeshSequenceEvents& events = {});
 
