@@ -250,16 +250,17 @@ void IncrementalDelaunay::arrange() {
     for (std::size_t c = 0; c < slots; ++c) number[c] = marks_[c] == kUnseen ? next[key(c)]++ : behind++;
     for (auto& links : cells_.links)
         for (int& link : links) link = Tetrahedra::link(number[link >> 2], link & 3);
-    // In place: with its arrays twice a DT would take its most memory here, and find other places each time.
-    for (std::size_t c = 0; c < slots; ++c)
-        while (number[c] != static_cast<int>(c)) {
-            const int to = number[c];
-            std::swap(cells_.vertices[c], cells_.vertices[to]);
-            std::swap(cells_.links[c], cells_.links[to]);
-            std::swap(number[c], number[to]);
-        }
-    cells_.vertices.resize(count);
-    cells_.links.resize(count);
+    // One array after the other, for with both twice a DT would take its most memory here; and back, so that
+    // each stays where it is: places that change would leave holes.
+    const auto put_in_order = [&](std::vector<std::array<int, 4>>& values) {
+        std::vector<std::array<int, 4>> ordered(count);
+        for (std::size_t c = 0; c < slots; ++c)
+            if (number[c] < count) ordered[number[c]] = values[c];
+        values.resize(count);
+        std::copy(ordered.begin(), ordered.end(), values.begin());
+    };
+    put_in_order(cells_.vertices);
+    put_in_order(cells_.links);
     marks_.assign(cells_.size(), kUnseen);
     free_.clear();
 }
