@@ -245,18 +245,17 @@ void IncrementalDelaunay::arrange() {
         if (marks_[c] == kUnseen) ++next[key(c) + 1];
     std::partial_sum(next.begin(), next.end(), next.begin());
     std::vector<int> number(slots);
-    const auto count = static_cast<int>(slots - free_.size());
-    int behind = count;  // the free ones
-    for (std::size_t c = 0; c < slots; ++c) number[c] = marks_[c] == kUnseen ? next[key(c)]++ : behind++;
+    for (std::size_t c = 0; c < slots; ++c)
+        if (marks_[c] == kUnseen) number[c] = next[key(c)]++;
     for (auto& links : cells_.links)
         for (int& link : links) link = Tetrahedra::link(number[link >> 2], link & 3);
     // One array after the other, for with both twice a DT would take its most memory here; and back, so that
     // each stays where it is: places that change would leave holes.
     const auto put_in_order = [&](std::vector<std::array<int, 4>>& values) {
-        std::vector<std::array<int, 4>> ordered(count);
+        std::vector<std::array<int, 4>> ordered(slots - free_.size());
         for (std::size_t c = 0; c < slots; ++c)
-            if (number[c] < count) ordered[number[c]] = values[c];
-        values.resize(count);
+            if (marks_[c] == kUnseen) ordered[number[c]] = values[c];
+        values.resize(ordered.size());
         std::copy(ordered.begin(), ordered.end(), values.begin());
     };
     put_in_order(cells_.vertices);

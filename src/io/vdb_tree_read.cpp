@@ -43,7 +43,7 @@ public:
         : buffer_(bytes), stream_(&buffer_), metadata_(std::make_shared<openvdb::io::StreamMetadata>()) {
         stream_.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
         openvdb::io::setStreamMetadataPtr(stream_, metadata_, false);
-        openvdb::io::setVersion(stream_, format.library_version, format.file_version);
+        openvdb::io::setVersion(stream_, format.openvdb_version, format.file_version);
         openvdb::io::setDataCompression(stream_, format.compression);
         openvdb::io::setGridClass(stream_, grid.getGridClass());
         openvdb::io::setGridBackgroundValuePtr(stream_, nullptr);

@@ -12,7 +12,7 @@ namespace isotrack {
 
 /// What the file says of how its trees are written.
 struct VdbTreeFormat {
-    openvdb::VersionId library_version;
+    openvdb::VersionId openvdb_version;
     std::uint32_t file_version;
     std::uint32_t compression;  ///< OpenVDB's flags.
 };

@@ -154,12 +154,12 @@ std::vector<FacetError> Inspector::errors_of(const std::vector<Vec3>& corners) c
     return errors_of(corners, triangles);
 }
 
-std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result) {
+std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result,
+                                            FacetChanges& changes) {
     constexpr std::size_t kSame = ~std::size_t{0};
     const MeshFacets facets(mesh.carved, mesh.vertices);
     std::vector<const FacetError*> known(facets.size(), nullptr);
     std::vector<char> seen(facets.size(), 0);  // in the mesh before
-    changes_ = {};
     const auto take_same = [&](std::size_t f, std::size_t old) {
         known[f] = &(*errors_)[old];
         seen[f] = 1;
@@ -176,14 +176,14 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
         facets, facets_, take_same,
         [&](std::size_t f, const Facet& facet) {
             if (facet.key < 0) return came.add(f, facet);
-            if (measured_) changes_.came.push_back(facet);
+            if (measured_) changes.came.push_back(facet);
             const auto [corner, whole] = corners_of(mesh.carved, f);
             const int e = expected_ && whole ? expected_->triangles.find(corner) : -1;
             if (e >= 0) known[f] = &expected_->errors[e];
         },
         [&](std::size_t old) {
             if (facets_[old].key < 0) return went.add(old, facets_[old]);
-            if (measured_) changes_.went.push_back(facets_[old]);
+            if (measured_) changes.went.push_back(facets_[old]);
         });
     for (const auto& [c, w] : same_corners(came.facet, went.facet)) {
         take_same(came.number[c], went.number[w]);
@@ -193,10 +193,10 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
         for (std::size_t i = 0; measured_ && i < some.number.size(); ++i)
             if (some.number[i] != kSame) changed.push_back(some.facet[i]);
     };
-    take_changed(came, changes_.came);
-    take_changed(went, changes_.went);
-    changes_.many = static_cast<double>(std::max(changes_.came.size(), changes_.went.size())) >
-                    kMany * static_cast<double>(facets.size());
+    take_changed(came, changes.came);
+    take_changed(went, changes.went);
+    changes.many = static_cast<double>(std::max(changes.came.size(), changes.went.size())) >
+                   kMany * static_cast<double>(facets.size());
     std::vector<Triangle> fresh;
     for (std::size_t f = 0; f < facets.size(); ++f)
         if (!known[f]) fresh.push_back(from_least_corner(mesh.carved.triangles[f]));
@@ -252,31 +252,32 @@ void Inspector::take_missed(std::size_t d, Inspection& result) {
 Inspection Inspector::inspect(const FrameMesh& mesh) {
     Inspection result;
     forget_distances();
-    doubt(measure_errors(mesh, result), kVainSpacing, result);
+    FacetChanges changes;
+    doubt(measure_errors(mesh, result, changes), kVainSpacing, result);
     return result;
 }
 
 Inspection Inspector::inspect_both_ways(const FrameMesh& mesh) {
     Inspection result;
-    doubt(measure_errors(mesh, result), kVainSpacing, result);
+    FacetChanges changes;
+    doubt(measure_errors(mesh, result, changes), kVainSpacing, result);
     measured_ = true;
     if (since_look_) {
-        since_look_->triangles += changes_.came.size() + changes_.went.size();
+        since_look_->triangles += changes.came.size() + changes.went.size();
         auto& corners = since_look_->corners;
-        for (const Facet& facet : changes_.came)
+        for (const Facet& facet : changes.came)
             corners.insert(corners.end(), facet.corner.begin(), facet.corner.end());
     }
-    if (!changes_.many)
-        changes_.around = triangles_near_gone(changes_.went, kAroundChanges * cutoff(), mesh.vertices,
-                                              mesh.carved.triangles);
+    if (!changes.many)
+        changes.around = triangles_near_gone(changes.went, kAroundChanges * cutoff(), mesh.vertices,
+                                             mesh.carved.triangles);
     for (std::size_t d = 0; d < distances_.size(); ++d) {
-        const auto changed = distances_[d].measure(mesh.vertices, mesh.carved.triangles, changes_);
+        const auto changed = distances_[d].measure(mesh.vertices, mesh.carved.triangles, changes);
         if (d == 0 && !changed) since_look_.reset();
         if (d == 0 && since_look_)
             since_look_->crossings.insert(since_look_->crossings.end(), changed->begin(), changed->end());
         take_missed(d, result);
     }
-    changes_ = {};  // of no more use
     return result;
 }
 

@@ -105,8 +105,8 @@ private:
     void measure_into(std::vector<FacetError>& errors, const std::vector<Vec3>& vertices,
                       const std::vector<Triangle>& triangles) const;
     /// Measures the triangles that are not those of the mesh before. Returns what cannot be mended, or was
-    /// not when it was seen last.
-    std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result);
+    /// not when it was seen last. `changes`: from the mesh before, where distances are kept up to date.
+    std::vector<Vec3> measure_errors(const FrameMesh& mesh, Inspection& result, FacetChanges& changes);
     void take_missed(std::size_t d, Inspection& result);  // by distances_[d]
     /// Means of crossings may be so far off the surface that a mesh with vertices on it is beyond the
     /// tolerance of them: those are set aside.
@@ -127,7 +127,6 @@ private:
     std::optional<Expected> expected_;                       // before the first inspection
     KeptFacets facets_;                                      // of the last inspection
     std::shared_ptr<const std::vector<FacetError>> errors_;  // of each
-    FacetChanges changes_;                                   // since the inspection before
     std::optional<BetweenCrossings> between_crossings_;
     std::optional<BetweenCrossings::Changes> since_look_;  // between crossings; none: not known
     std::deque<CrossingGrid> between_;                     // points between crossings, as they were found
