@@ -64,7 +64,6 @@ void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface&
         if (!lone[v]) movable[v] = 1;  // where it was is not known
         if (!movable[v]) mesh.vertices[v] = position_[mesh.carved.particle[v]].cast<double>();
     }
-    add_ring(movable, triangles);
     const bool flips = is_first && tolerance;
     fit(mesh.vertices, triangles, surface, flips ? kStepsBeforeFlips : kSteps, movable);
     if (flips) {
