@@ -16,8 +16,8 @@ class Fitted {
 public:
     /// Fits the first mesh, and flips edges that keep its triangles from their surface. `tolerance`: what
     /// none of these may come to be beyond by a flip; without it none flips. Of the next meshes it fits anew
-    /// what is within a ring of where one differs from the last; the rest goes to where it was, with the
-    /// same flips where all their triangles are there. A mesh of which more than half is new counts as the
+    /// the corners of triangles that the last did not have; the rest goes to where it was, with the same
+    /// flips where all their triangles are there. A mesh of which more than half is new counts as the
     /// first. A flipped triangle keeps the cell and facet of the one in whose place it is. `particles`: how
     /// many there are; in all these meshes they are in the same places.
     void fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface& surface,
