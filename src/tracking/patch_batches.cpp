@@ -149,7 +149,7 @@ bool fails_at_many(const MeshTrials& trials, const Surface& surface) {
 }
 
 bool take_lattice_mesh(MeshTrials& trials, const Surface& surface, const SizingLimits& limits) {
-    constexpr double kLeastFailing = 0.1;  // places for each triangle
+    constexpr double kLeastFailing = 0.05;  // places for each triangle
     const auto triangles = static_cast<double>(trials.mesh().carved.triangles.size());
     if (trials.inspection().missed.empty() ||
         static_cast<double>(trials.failing_places().size()) < kLeastFailing * triangles)
