@@ -4,6 +4,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "find_in_blocks.h"
@@ -17,8 +18,7 @@
 namespace isotrack {
 namespace {
 
-constexpr int kRounds = 2;
-constexpr int kFitSteps = 3;
+constexpr int kFitSteps = 6;
 // Vertices slide more freely than in a fit: on to the crease, if it takes some steps.
 constexpr double kDamping = 0.001;
 constexpr double kGain = 0.9;    // of the error, at most, for a flip to be worth it
@@ -37,16 +37,13 @@ public:
                double tolerance)
         : points_(points),
           triangles_(triangles),
-          at_start_(triangles),
-          corners_at_start_(points.size(), triangles),
-          surface_(surface),
+          corners_(points.size(), triangles),
+          facets_(facet_values(points, triangles, corners_, surface)),
           probes_(surface),
           tolerance_(tolerance) {}
 
-    /// Flips what gains most first, and nothing next to it. Returns the triangles.
-    std::vector<std::array<int, 2>> pass(const std::vector<char>& movable) {
-        const Corners corners(points_.size(), triangles_);
-        facets_ = facet_values(points_, triangles_, corners, surface_);
+    /// Flips what gains most first, and no triangle twice. Returns the triangles.
+    std::vector<std::array<int, 2>> flip(const std::vector<char>& movable) {
         std::vector<double> error(triangles_.size(), 0.0);
         for (std::size_t t = 0; t < triangles_.size(); ++t) {
             const auto& [i, j, k] = triangles_[t];
@@ -56,37 +53,36 @@ public:
         const double worth = 2.0 * kWorth * std::accumulate(error.begin(), error.end(), 0.0) /
                              static_cast<double>(std::max<std::ptrdiff_t>(1, count));
         constexpr std::size_t kTrianglesPerBlock = 1024;
-        const std::vector<Flip> flips = find_in_blocks<Flip>(
-            triangles_.size(), kTrianglesPerBlock,
-            [&](std::size_t begin, std::size_t end, std::vector<Flip>& found) {
-                for (std::size_t t = begin; t < end; ++t)
-                    for (int k = 0; k < 3; ++k)
-                        if (auto flip = flip_of(static_cast<int>(t), k, corners, error, worth))
-                            found.push_back(*flip);
-            });
+        const std::vector<Flip> flips =
+            find_in_blocks<Flip>(triangles_.size(), kTrianglesPerBlock,
+                                 [&](std::size_t begin, std::size_t end, std::vector<Flip>& found) {
+                                     for (std::size_t t = begin; t < end; ++t)
+                                         for (int k = 0; k < 3; ++k)
+                                             if (auto flip = flip_of(static_cast<int>(t), k, error, worth))
+                                                 found.push_back(*flip);
+                                 });
         std::vector<const Flip*> by_gain;
         by_gain.reserve(flips.size());
         for (const Flip& flip : flips) by_gain.push_back(&flip);
         std::stable_sort(by_gain.begin(), by_gain.end(),
                          [](const Flip* a, const Flip* b) { return a->gain > b->gain; });
-        std::vector<char> touched(points_.size(), 0);
+        std::vector<char> flipped(triangles_.size(), 0);
+        std::set<std::pair<int, int>> made;  // edges: two flips may be after the same
         std::vector<std::array<int, 2>> done;
         for (const Flip* best : by_gain) {
-            const Flip& flip = *best;
-            const auto is_touched = [&](const Triangle& t) {
-                return std::any_of(t.begin(), t.end(), [&](int v) { return touched[v]; });
-            };
-            if (is_touched(flip.after[0]) || is_touched(flip.after[1])) continue;
+            const auto& [t, other] = best->triangle;
+            if (flipped[t] || flipped[other]) continue;
+            if (!made.insert(std::minmax(best->after[0][0], best->after[0][2])).second) continue;
             for (int i = 0; i < 2; ++i) {
-                triangles_[flip.triangle[i]] = flip.after[i];
-                facets_[flip.triangle[i]] = flip.facet[i];
-                for (const int v : flip.after[i]) touched[v] = 1;
+                flipped[best->triangle[i]] = 1;
+                triangles_[best->triangle[i]] = best->after[i];
+                facets_[best->triangle[i]] = best->facet[i];
             }
-            done.push_back(flip.triangle);
+            done.push_back(best->triangle);
         }
         return done;
     }
-    /// Of the triangles after the last pass, which are given up.
+    /// Of the triangles as they are now, which are given up.
     std::vector<FacetValues> take_facets() { return std::move(facets_); }
 
 private:
@@ -107,11 +103,8 @@ private:
     double facing(const Triangle& t, Surface::Probe& probe) const {
         return isotrack::facing(points_[t[0]], points_[t[1]], points_[t[2]], probe);
     }
-    bool is_edge(int v, int w, const Corners& corners) const {
-        const auto has = [&](const std::vector<Triangle>& triangles, const Corners& of) {
-            return of.beyond(v, w, triangles).second >= 0 || of.beyond(w, v, triangles).second >= 0;
-        };
-        return has(triangles_, corners) || has(at_start_, corners_at_start_);
+    bool is_edge(int v, int w) const {
+        return corners_.beyond(v, w, triangles_).second >= 0 || corners_.beyond(w, v, triangles_).second >= 0;
     }
 
     /// About the least error that triangles t and `other` may have with the other diagonal, from a to d
@@ -148,12 +141,11 @@ private:
 
     /// The other diagonal for the edge opposite to corner k, from the side of its lower vertex; none where it
     /// may not be, or gains too little. `error`: of each triangle, 0 of those that stay.
-    std::optional<Flip> flip_of(int t, int k, const Corners& corners, const std::vector<double>& error,
-                                double worth) {
+    std::optional<Flip> flip_of(int t, int k, const std::vector<double>& error, double worth) {
         const Triangle& old = triangles_[t];
         const int a = old[k], b = old[(k + 1) % 3], c = old[(k + 2) % 3];
         if (b > c || !(error[t] > 0.0)) return {};
-        const auto [d, other] = corners.beyond(c, b, triangles_);
+        const auto [d, other] = corners_.beyond(c, b, triangles_);
         if (d < 0 || d == a || !(error[other] > 0.0) || error[t] + error[other] < worth) return {};
         const double before = error[t] + error[other];
         const std::array<Triangle, 2> after = {{{a, b, d}, {a, d, c}}};
@@ -162,7 +154,7 @@ private:
               std::max(sharpness_of(old), sharpness_of(triangles_[other]))))
             return {};
         if (!(expected_error(t, other, a, b, c, d) < kGain * before)) return {};
-        if (is_edge(a, d, corners)) return {};
+        if (is_edge(a, d)) return {};
         Surface::Probe& probe = probes_.local();
         const FacetValues first = facet_of(after[0], probe);
         if (!(first.error() < kGain * before)) return {};
@@ -179,12 +171,10 @@ private:
 
     const std::vector<Vec3>& points_;
     std::vector<Triangle>& triangles_;
-    const std::vector<Triangle> at_start_;
-    const Corners corners_at_start_;
-    const Surface& surface_;
+    const Corners corners_;  // before any flip
+    std::vector<FacetValues> facets_;
     ThreadProbes probes_;
     const double tolerance_;
-    std::vector<FacetValues> facets_;
 };
 
 }  // namespace
@@ -193,13 +183,9 @@ std::vector<std::array<int, 2>> refit(std::vector<Vec3>& vertices, std::vector<T
                                       const Surface& surface, double tolerance,
                                       const std::vector<char>& movable) {
     ErrorFlips flips(vertices, triangles, surface, tolerance);
-    std::vector<std::array<int, 2>> done;
-    for (int round = 0; round < kRounds; ++round) {
-        const auto some = flips.pass(movable);
-        done.insert(done.end(), some.begin(), some.end());
-        fit_steps(vertices, triangles, Corners(vertices.size(), triangles), flips.take_facets(), surface,
-                  kFitSteps, movable, kDamping);
-    }
+    const auto done = flips.flip(movable);
+    fit_steps(vertices, triangles, Corners(vertices.size(), triangles), flips.take_facets(), surface,
+              kFitSteps, movable, kDamping);
     return done;
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <numeric>
 #include <utility>
 
 namespace isotrack {
@@ -34,89 +33,79 @@ Edges edges_of_new(const std::vector<Triangle>& triangles, const std::vector<int
     return result;
 }
 
+/// In order, and each is looked at once.
+template <typename T, typename Keep>
+void keep_those(std::vector<T>& values, const Keep& keep) {
+    auto kept = values.begin();
+    for (T& value : values)
+        if (keep(value)) *kept++ = value;
+    values.erase(kept, values.end());
+}
+
 }  // namespace
 
 KeptFlips::KeptFlips(const std::vector<std::array<int, 2>>& flips, const std::vector<Triangle>& before,
                      const CarvedSurface& carved) {
-    std::vector<int> next(before.size());  // in a cycle through the triangles of a group
-    std::iota(next.begin(), next.end(), 0);
-    const auto are_together = [&](int t, int u) {
-        for (int w = next[t]; w != t; w = next[w])
-            if (w == u) return true;
-        return false;
-    };
-    for (const auto& [t, u] : flips)
-        if (!are_together(t, u)) std::swap(next[t], next[u]);  // joins the two cycles
-    int group = 0;
+    flips_.reserve(flips.size());
     for (const auto& flip : flips) {
-        if (next[flip[0]] < 0) continue;  // with an earlier flip
-        for (int t = flip[0]; next[t] >= 0;) {
-            flipped_.push_back({group, t, renamed(before[t], carved.particle),
-                                renamed(carved.triangles[t], carved.particle)});
-            t = std::exchange(next[t], -1);
+        Kept kept{flip, {}, {}};
+        for (int i = 0; i < 2; ++i) {
+            kept.before[i] = renamed(before[flip[i]], carved.particle);
+            kept.after[i] = renamed(carved.triangles[flip[i]], carved.particle);
         }
-        ++group;
+        flips_.push_back(kept);
     }
-}
-
-template <typename Keep>
-void KeptFlips::filter_groups(const Keep& keep) {
-    auto kept = flipped_.begin();
-    for (auto from = flipped_.begin(); from != flipped_.end();) {
-        const auto to = std::find_if(from, flipped_.end(),
-                                     [&](const Flipped& other) { return other.group != from->group; });
-        if (keep(from, to)) kept = kept == from ? to : std::move(from, to, kept);
-        from = to;
-    }
-    flipped_.erase(kept, flipped_.end());
 }
 
 void KeptFlips::put_into(CarvedSurface& carved, const std::vector<int>& now, const std::vector<int>& vertex,
                          std::vector<char>& around) {
-    if (flipped_.empty()) return;
+    if (flips_.empty()) return;
     const Edges of_new = edges_of_new(carved.triangles, now);
-    filter_groups([&](auto from, auto to) {
-        bool stays = std::all_of(from, to, [&](const Flipped& f) {
-            return now[f.triangle] >= 0 &&
-                   std::all_of(f.after.begin(), f.after.end(), [&](int p) { return vertex[p] >= 0; });
-        });
-        if (stays) {
-            Edges before, after;
-            std::for_each(from, to, [&](const Flipped& f) {
-                add_edges(renamed(f.before, vertex), before);
-                add_edges(renamed(f.after, vertex), after);
-            });
-            std::sort(before.begin(), before.end());
-            stays = std::none_of(after.begin(), after.end(),
-                                 [&](const auto& edge) { return !has(before, edge) && has(of_new, edge); });
+    const auto is_there = [&](const Kept& flip) {
+        for (int i = 0; i < 2; ++i)
+            if (now[flip.triangle[i]] < 0 ||
+                std::any_of(flip.after[i].begin(), flip.after[i].end(), [&](int p) { return vertex[p] < 0; }))
+                return false;
+        Edges before, after;
+        for (int i = 0; i < 2; ++i) {
+            add_edges(renamed(flip.before[i], vertex), before);
+            add_edges(renamed(flip.after[i], vertex), after);
         }
-        for (; from != to; ++from) {
-            from->triangle = now[from->triangle];
+        std::sort(before.begin(), before.end());
+        return std::none_of(after.begin(), after.end(),
+                            [&](const auto& edge) { return !has(before, edge) && has(of_new, edge); });
+    };
+    keep_those(flips_, [&](Kept& flip) {
+        const bool stays = is_there(flip);
+        for (int i = 0; i < 2; ++i) {
+            int& triangle = flip.triangle[i];
+            triangle = now[triangle];
             if (stays)
-                carved.triangles[from->triangle] = renamed(from->after, vertex);
-            else if (from->triangle >= 0)
-                for (const int v : carved.triangles[from->triangle]) around[v] = 1;
+                carved.triangles[triangle] = renamed(flip.after[i], vertex);
+            else if (triangle >= 0)
+                for (const int v : carved.triangles[triangle]) around[v] = 1;
         }
         return stays;
     });
 }
 
 bool KeptFlips::undo_at(std::vector<char>& flagged, const std::vector<int>& vertex, CarvedSurface& carved) {
-    const std::size_t count = flipped_.size();
-    for (std::size_t before = 0; before != flipped_.size();) {  // until no flag hits another group
-        before = flipped_.size();
-        filter_groups([&](auto from, auto to) {
-            const bool stays = std::none_of(from, to, [&](const Flipped& f) {
-                return std::any_of(f.after.begin(), f.after.end(), [&](int p) { return flagged[vertex[p]]; });
-            });
-            for (; !stays && from != to; ++from) {
-                carved.triangles[from->triangle] = renamed(from->before, vertex);
-                for (const int p : from->before) flagged[vertex[p]] = 1;
+    const std::size_t count = flips_.size();
+    for (std::size_t before = 0; before != flips_.size();) {  // until no flag hits another
+        before = flips_.size();
+        keep_those(flips_, [&](const Kept& flip) {
+            const auto is_flagged = [&](const Triangle& t) {
+                return std::any_of(t.begin(), t.end(), [&](int p) { return flagged[vertex[p]]; });
+            };
+            if (!is_flagged(flip.after[0]) && !is_flagged(flip.after[1])) return true;
+            for (int i = 0; i < 2; ++i) {
+                carved.triangles[flip.triangle[i]] = renamed(flip.before[i], vertex);
+                for (const int p : flip.before[i]) flagged[vertex[p]] = 1;
             }
-            return stays;
+            return false;
         });
     }
-    return flipped_.size() < count;
+    return flips_.size() < count;
 }
 
 }  // namespace isotrack
