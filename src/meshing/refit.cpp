@@ -21,8 +21,8 @@ namespace {
 constexpr int kFitSteps = 6;
 // Vertices slide more freely than in a fit: on to the crease, if it takes some steps.
 constexpr double kDamping = 0.001;
-constexpr double kGain = 0.9;    // of the error, at most, for a flip to be worth it
-constexpr double kWorth = 0.25;  // of the mean error of two triangles: less is not looked at
+constexpr double kGain = 0.9;   // of the error, at most, for a flip to be worth it
+constexpr double kWorth = 0.1;  // of the mean error of two triangles: less is not looked at
 
 struct Flip {
     double gain;

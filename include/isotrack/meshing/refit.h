@@ -14,7 +14,7 @@ namespace isotrack {
 /// them onto it. The mesh must be closed, oriented and manifold, and stays so; its topology does not change.
 ///
 /// An edge flips where the error of its two triangles, area times mean square, falls by a tenth or more, and
-/// is at least a quarter of what it is on average; where none of the new ones has an angle below 30 degrees,
+/// is at least a tenth of what it is on average; where none of the new ones has an angle below 30 degrees,
 /// or below what the old ones had; where both are within `tolerance` and face the way the surface does, or no
 /// worse than the old ones. What a flip may gain is guessed first, from the values on the old triangles.
 /// `movable`: a flag per vertex; the others stay, and so do the edges of triangles around them.
