@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <utility>
 
+#include "sampling/compact.h"
+
 namespace isotrack {
 namespace {
 
@@ -31,15 +33,6 @@ Edges edges_of_new(const std::vector<Triangle>& triangles, const std::vector<int
         if (is_new[t]) add_edges(triangles[t], result);
     std::sort(result.begin(), result.end());
     return result;
-}
-
-/// In order, and each is looked at once.
-template <typename T, typename Keep>
-void keep_those(std::vector<T>& values, const Keep& keep) {
-    auto kept = values.begin();
-    for (T& value : values)
-        if (keep(value)) *kept++ = value;
-    values.erase(kept, values.end());
 }
 
 }  // namespace
@@ -75,37 +68,42 @@ void KeptFlips::put_into(CarvedSurface& carved, const std::vector<int>& now, con
         return std::none_of(after.begin(), after.end(),
                             [&](const auto& edge) { return !has(before, edge) && has(of_new, edge); });
     };
-    keep_those(flips_, [&](Kept& flip) {
-        const bool stays = is_there(flip);
+    std::vector<char> keep;
+    for (Kept& flip : flips_) {
+        keep.push_back(is_there(flip));
         for (int i = 0; i < 2; ++i) {
             int& triangle = flip.triangle[i];
             triangle = now[triangle];
-            if (stays)
+            if (keep.back())
                 carved.triangles[triangle] = renamed(flip.after[i], vertex);
             else if (triangle >= 0)
                 for (const int v : carved.triangles[triangle]) around[v] = 1;
         }
-        return stays;
-    });
+    }
+    compact(flips_, keep);
 }
 
 bool KeptFlips::undo_at(std::vector<char>& flagged, const std::vector<int>& vertex, CarvedSurface& carved) {
-    const std::size_t count = flips_.size();
-    for (std::size_t before = 0; before != flips_.size();) {  // until no flag hits another
-        before = flips_.size();
-        keep_those(flips_, [&](const Kept& flip) {
-            const auto is_flagged = [&](const Triangle& t) {
-                return std::any_of(t.begin(), t.end(), [&](int p) { return flagged[vertex[p]]; });
-            };
-            if (!is_flagged(flip.after[0]) && !is_flagged(flip.after[1])) return true;
+    const auto is_flagged = [&](const Triangle& t) {
+        return std::any_of(t.begin(), t.end(), [&](int p) { return flagged[vertex[p]]; });
+    };
+    std::vector<char> keep(flips_.size(), 1);
+    bool any = false;
+    for (bool changed = true; changed;) {  // until no flag hits another
+        changed = false;
+        for (std::size_t f = 0; f < flips_.size(); ++f) {
+            const Kept& flip = flips_[f];
+            if (!keep[f] || (!is_flagged(flip.after[0]) && !is_flagged(flip.after[1]))) continue;
             for (int i = 0; i < 2; ++i) {
                 carved.triangles[flip.triangle[i]] = renamed(flip.before[i], vertex);
                 for (const int p : flip.before[i]) flagged[vertex[p]] = 1;
             }
-            return false;
-        });
+            keep[f] = 0;
+            any = changed = true;
+        }
     }
-    return flips_.size() < count;
+    compact(flips_, keep);
+    return any;
 }
 
 }  // namespace isotrack

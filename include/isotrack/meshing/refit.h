@@ -10,8 +10,8 @@
 namespace isotrack {
 
 /// Lowers the squared distance between triangles and surface by flips of edges, then a few steps of `fit`: an
-/// edge across a crease cuts it, and a fit cannot help that; once edges follow the crease, it moves
-/// them onto it. The mesh must be closed, oriented and manifold, and stays so; its topology does not change.
+/// edge across a crease cuts it, and a fit cannot help that; once edges follow the crease, it moves them onto
+/// it. The mesh must be closed, oriented and manifold, and stays so; its topology does not change.
 ///
 /// An edge flips where the error of its two triangles, area times mean square, falls by a tenth or more, and
 /// is at least a tenth of what it is on average; where none of the new ones has an angle below 30 degrees,
