@@ -8,7 +8,7 @@
 namespace isotrack {
 namespace {
 
-constexpr int kStepsPerReading = 3;
+constexpr int kStepsPerReading = 2;
 
 }  // namespace
 

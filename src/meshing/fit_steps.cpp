@@ -44,11 +44,33 @@ constexpr Moments kMoments = [] {
     return m;
 }();
 
-constexpr double kRelaxation = 1.5;   // the shares of the neighbours make each step too short
 constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
 constexpr int kHalvings = 2;          // of the steps around a spoilt triangle, before they are taken back
 constexpr double kSmooth = 0.9;  // cosine between the facets around a vertex and their mean: less is a crease
 constexpr std::size_t kVertexGrain = 256, kTriangleGrain = 64;
+
+/// How long steps are, and how much of the last one is made again: Chebyshev's semi-iteration [Golub, Varga
+/// 1961]. A vertex that solves a quadric of its own leaves out that its neighbours move as well. What it
+/// solves for are the row sums of the normal equations: times the inverse of these, the equations have
+/// eigenvalues from kLeast, those of a triangle's corners against each other, to 1, of all alike.
+class Pace {
+public:
+    double length() const { return length_; }
+    double again() const { return again_; }
+    void next() {
+        const double share = (is_first_ ? 0.5 : 0.25) * kHalf * kHalf * length_;
+        is_first_ = false;
+        const double length = 1.0 / (kMiddle - share);
+        again_ = share * length;
+        length_ = length;
+    }
+
+private:
+    static constexpr double kLeast = (kMoments.same - kMoments.different) / kMoments.one;
+    static constexpr double kMiddle = 0.5 * (1.0 + kLeast), kHalf = 0.5 * (1.0 - kLeast);
+    double length_ = 1.0 / kMiddle, again_ = 0.0;
+    bool is_first_ = true;
+};
 
 /// A triangle's share in the normal equations of its corners.
 struct Share {
@@ -115,7 +137,7 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
     for (std::size_t v = 0; v < vertices.size(); ++v)
         if (movable[v]) moving.push_back(static_cast<int>(v));
 
-    std::vector<Mat3> inverse(moving.size());  // of the quadrics, zero without one
+    std::vector<Eigen::Matrix3f> inverse(moving.size());  // of the quadrics, zero without one; there are many
     std::vector<char> creased(vertices.size(), 0);
     parallel_for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
         const int v = moving[m];
@@ -132,11 +154,14 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
                 creased[v] = 1;
         const double trace = quadric.trace();
         quadric.diagonal().array() += damping * trace;
-        inverse[m] = trace > 0.0 ? Mat3(quadric.ldlt().solve(Mat3::Identity())) : Mat3(Mat3::Zero());
+        inverse[m].setZero();
+        if (trace > 0.0) inverse[m] = quadric.ldlt().solve(Mat3::Identity()).cast<float>();
     });
     std::vector<Vec3> to = vertices;
+    std::vector<Eigen::Vector3f> last(moving.size(), Eigen::Vector3f::Zero());  // steps
     ThreadProbes probes(surface);
-    for (int step = 0; step < steps; ++step) {
+    Pace pace;
+    for (int step = 0; step < steps; ++step, pace.next()) {
         parallel_for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
             const int v = moving[m];
             Vec3 pull = Vec3::Zero();
@@ -147,7 +172,8 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
                 for (const int other : {triangles[t][(k + 1) % 3], triangles[t][(k + 2) % 3]})
                     shortest2 = std::min(shortest2, (vertices[other] - vertices[v]).squaredNorm());
             }
-            Vec3 move = -kRelaxation * (inverse[m] * pull);
+            Vec3 move =
+                pace.again() * last[m].cast<double>() - pace.length() * (inverse[m].cast<double>() * pull);
             const double length = move.norm(), limit = kLargestStep * std::sqrt(shortest2);
             if (length > limit) move *= limit / length;
             to[v] = vertices[v] + move;
@@ -164,7 +190,11 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
                 else
                     shares[t].move({way(i), way(j), way(k)});
             });
-        for (const int v : moving) vertices[v] = to[v];
+        for (std::size_t m = 0; m < moving.size(); ++m) {
+            const int v = moving[m];
+            last[m] = (to[v] - vertices[v]).cast<float>();
+            vertices[v] = to[v];
+        }
     }
 }
 

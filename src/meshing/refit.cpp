@@ -18,7 +18,7 @@
 namespace isotrack {
 namespace {
 
-constexpr int kFitSteps = 6;
+constexpr int kFitSteps = 4;
 // Vertices slide more freely than in a fit: on to the crease, if it takes some steps.
 constexpr double kDamping = 0.001;
 constexpr double kGain = 0.9;   // of the error, at most, for a flip to be worth it

@@ -11,7 +11,7 @@
 namespace isotrack {
 namespace {
 
-constexpr int kSteps = 6, kStepsBeforeFlips = 3;  // others follow these
+constexpr int kSteps = 4, kStepsBeforeFlips = 2;  // others follow these
 
 void add_ring(std::vector<char>& flags, const std::vector<Triangle>& triangles) {
     const std::vector<char> before = flags;
