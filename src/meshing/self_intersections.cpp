@@ -1,17 +1,13 @@
 #include "isotrack/meshing/self_intersections.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/box_intersection_d.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
-#include <atomic>
-#include <cmath>
-#include <limits>
 #include <string>
 
+#include "find_in_blocks.h"
 #include "isotrack/error.h"
+#include "meshing/box_tree.h"
 #include "meshing/triangle_box.h"
 #include "parallel_for_each.h"
 
@@ -34,17 +30,19 @@ bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
 }
 
 /// Whether a plane through `apex` has p and q strictly on one side and r and s strictly on the other. The
-/// plane tried is the one between the bisectors of the two wedges, which is right for almost all neighbours
-/// round a vertex. True is certain, false is not.
+/// planes tried are the one between their middles and the one between the bisectors of the two wedges, which
+/// is right for almost all neighbours round a vertex. True is certain, false is not.
 bool are_clearly_apart(const Vec3& apex, const Vec3& p, const Vec3& q, const Vec3& r, const Vec3& s) {
     // Coordinate differences are exact to half a unit in the last place, so a dot product of three terms is
     // wrong by less than 8 eps |x| |d|, with lengths in the maximum norm.
     constexpr double kMargin = 1e-14;
     const Vec3 a = p - apex, b = q - apex, c = r - apex, d = s - apex;
-    const Vec3 direction = (a / a.norm() + b / b.norm()) - (c / c.norm() + d / d.norm());
-    const double margin = kMargin * direction.lpNorm<1>();
-    return a.dot(direction) > margin * a.lpNorm<1>() && b.dot(direction) > margin * b.lpNorm<1>() &&
-           c.dot(direction) < -margin * c.lpNorm<1>() && d.dot(direction) < -margin * d.lpNorm<1>();
+    const auto parts = [&](const Vec3& direction) {
+        const double margin = kMargin * direction.lpNorm<1>();
+        return a.dot(direction) > margin * a.lpNorm<1>() && b.dot(direction) > margin * b.lpNorm<1>() &&
+               c.dot(direction) < -margin * c.lpNorm<1>() && d.dot(direction) < -margin * d.lpNorm<1>();
+    };
+    return parts((a + b) - (c + d)) || parts((a / a.norm() + b / b.norm()) - (c / c.norm() + d / d.norm()));
 }
 
 /// Whether segment pq meets triangle abc, which has area.
@@ -85,50 +83,6 @@ bool cross(const std::vector<Vec3>& points, const Triangle& first, const Triangl
     }
 }
 
-/// A triangle's bounding box, in the form CGAL's box intersection asks for. Its axes are those of space in
-/// another order. In floats from the least corner of all on, rounded outwards: there are many.
-struct TriangleBox {
-    using NT = float;
-    using ID = int;
-    static int dimension() { return 3; }
-    float min_coord(int axis) const { return low[axis]; }
-    float max_coord(int axis) const { return high[axis]; }
-    int id() const { return triangle; }
-
-    float low[3], high[3];
-    int triangle;
-};
-
-float rounded_down(double x) {
-    const auto nearest = static_cast<float>(x);
-    return nearest > x ? std::nextafter(nearest, -std::numeric_limits<float>::infinity()) : nearest;
-}
-
-float rounded_up(double x) {
-    return -rounded_down(-x);
-}
-
-// Space is cut into slabs across its longest axis, so that threads can search them one by one. CGAL splits
-// boxes along its axis 2, then 1, and scans along axis 0: with the thin side of the slabs on axis 1 a search
-// costs 0.5 us per triangle, on axis 2 up to 2.
-constexpr int kSlabAxis = 1;
-constexpr std::size_t kSlabSize = 4096;               // boxes that begin in a slab, at most on average
-constexpr std::size_t kFewest = 4, kLeastSlab = 512;  // slabs, unless they would have fewer boxes
-constexpr std::ptrdiff_t kScanBelow = 100;  // boxes; splitting further costs more than comparing all
-
-/// `order`: the axis of space that is each axis of the box.
-TriangleBox boxed(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles, std::size_t t,
-                  const Vec3& from, const std::array<int, 3>& order) {
-    const Box box = box_of(points, triangles[t]);
-    TriangleBox result;
-    for (int k = 0; k < 3; ++k) {
-        result.low[k] = rounded_down(box.min()[order[k]] - from[order[k]]);
-        result.high[k] = rounded_up(box.max()[order[k]] - from[order[k]]);
-    }
-    result.triangle = static_cast<int>(t);
-    return result;
-}
-
 /// Throws where a vertex is not finite or a triangle names one that is not there.
 void check(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
     for (std::size_t i = 0; i < points.size(); ++i)
@@ -140,84 +94,30 @@ void check(const std::vector<Vec3>& points, const std::vector<Triangle>& triangl
                                  " of a mesh with " + std::to_string(points.size()) + " vertices");
 }
 
-/// The boxes of the triangles with area, those that begin in the same slab next to each other.
-struct Slabs {
-    Slabs(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles);
-
-    std::size_t size() const { return earlier.size(); }
-    auto begin_of(std::size_t slab) { return boxes.begin() + first[slab]; }
-    auto end_of(std::size_t slab) { return boxes.begin() + first[slab + 1]; }
-
-    std::vector<TriangleBox> boxes;
-    std::vector<std::ptrdiff_t> first;              // of each slab, and the end
-    std::vector<std::vector<TriangleBox>> earlier;  // that begin in a slab before and reach into this one
-};
-
-Slabs::Slabs(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
-    Box bounds;
-    for (const Vec3& p : points) bounds.extend(p);
-    int longest = 0;
-    if (!bounds.isEmpty()) bounds.sizes().maxCoeff(&longest);
-    std::array<int, 3> order;
-    for (int k = 0; k < 3; ++k) order[k] = (longest + 3 + k - kSlabAxis) % 3;
-    const auto box_at = [&](std::size_t t) { return boxed(points, triangles, t, bounds.min(), order); };
-
-    constexpr std::size_t kEvery = 64;  // triangle of which one is a sample
-    std::vector<float> sample;
-    for (std::size_t t = 0; t < triangles.size(); t += kEvery) sample.push_back(box_at(t).low[kSlabAxis]);
-    std::sort(sample.begin(), sample.end());
-    const std::size_t wanted =
-        std::max(triangles.size() / kSlabSize + 1, std::min(triangles.size() / kLeastSlab, kFewest));
-    std::vector<float> begins;  // of all slabs but the first
-    for (std::size_t k = 1; k < wanted; ++k) begins.push_back(sample[k * sample.size() / wanted]);
-
-    // Which slab is found before there are boxes: to hold them twice would take the most memory of a frame.
+std::vector<char> with_area(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
     constexpr std::size_t kGrain = 1024;
-    constexpr int kFlat = -1;
-    std::vector<int> slab(triangles.size());
-    std::vector<std::atomic<std::ptrdiff_t>> next(begins.size() + 1);
+    std::vector<char> result(triangles.size());
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         const auto& [i, j, k] = triangles[t];
-        slab[t] = kFlat;
-        if (!has_area(points[i], points[j], points[k])) return;
-        slab[t] = static_cast<int>(std::upper_bound(begins.begin(), begins.end(), box_at(t).low[kSlabAxis]) -
-                                   begins.begin());
-        next[slab[t]].fetch_add(1, std::memory_order_relaxed);
+        result[t] = has_area(points[i], points[j], points[k]);
     });
-    first.assign(1, 0);
-    for (auto& of_slab : next) first.push_back(first.back() + of_slab.exchange(first.back()));
-    boxes.resize(first.back());
-    parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
-        if (slab[t] != kFlat) boxes[next[slab[t]].fetch_add(1, std::memory_order_relaxed)] = box_at(t);
-    });
-    earlier.resize(next.size());
-    for (std::size_t own = 0; own < size(); ++own)
-        for (auto box = begin_of(own); box != end_of(own); ++box)
-            for (std::size_t k = own; k < begins.size() && begins[k] <= box->high[kSlabAxis]; ++k)
-                earlier[k + 1].push_back(*box);
+    return result;
 }
 
 }  // namespace
 
 std::vector<std::pair<int, int>> self_intersections(const std::vector<Vec3>& points,
                                                     const std::vector<Triangle>& triangles) {
-    // Two boxes that overlap do so in the slab where the second of them begins.
+    constexpr std::size_t kLeavesPerBlock = 32;
     check(points, triangles);
-    Slabs slabs(points, triangles);
-    std::vector<Pairs> found(slabs.size());
-    tbb::parallel_for(std::size_t(0), slabs.size(), [&](std::size_t k) {
-        auto& earlier = slabs.earlier[k];
-        const auto test = [&](const TriangleBox& a, const TriangleBox& b) {
-            if (cross(points, triangles[a.triangle], triangles[b.triangle]))
-                found[k].push_back(std::minmax(a.triangle, b.triangle));
-        };
-        CGAL::box_self_intersection_d(slabs.begin_of(k), slabs.end_of(k), test, kScanBelow);
-        CGAL::box_intersection_d(earlier.begin(), earlier.end(), slabs.begin_of(k), slabs.end_of(k), test,
-                                 kScanBelow);
-    });
-
-    Pairs result;
-    for (const Pairs& pairs : found) result.insert(result.end(), pairs.begin(), pairs.end());
+    const BoxTree tree(points, triangles, with_area(points, triangles));
+    Pairs result = find_in_blocks<std::pair<int, int>>(
+        tree.leaf_count(), kLeavesPerBlock, [&](std::size_t begin, std::size_t end, Pairs& found) {
+            for (std::size_t leaf = begin; leaf < end; ++leaf)
+                tree.for_each_pair_of(leaf, [&](int t, int u) {
+                    if (cross(points, triangles[t], triangles[u])) found.push_back(std::minmax(t, u));
+                });
+        });
     std::sort(result.begin(), result.end());
     return result;
 }
@@ -252,28 +152,19 @@ bool any_cross(const std::vector<Vec3>& points, const std::vector<Triangle>& som
 
 std::vector<char> crossed_by(const std::vector<Vec3>& points, const std::vector<Triangle>& some,
                              const std::vector<Triangle>& others) {
-    std::vector<char> crossed(others.size(), 0);
+    const std::vector<char> area = with_area(points, some);
     Box bounds;
     for (const Triangle& t : some) bounds.extend(box_of(points, t));
-    const auto boxes_of = [&](const std::vector<Triangle>& triangles) {
-        std::vector<TriangleBox> boxes;
-        for (std::size_t t = 0; t < triangles.size(); ++t) {
-            const auto& [i, j, k] = triangles[t];
-            if (bounds.intersects(box_of(points, triangles[t])) && has_area(points[i], points[j], points[k]))
-                boxes.push_back(boxed(points, triangles, t, bounds.min(), {0, 1, 2}));
-        }
-        return boxes;
-    };
-    std::vector<TriangleBox> ours = boxes_of(some), near = boxes_of(others);
-    const int behind = static_cast<int>(others.size());  // CGAL takes boxes with one number for the same
-    for (TriangleBox& box : ours) box.triangle += behind;
-    CGAL::box_intersection_d(
-        ours.begin(), ours.end(), near.begin(), near.end(),
-        [&](const TriangleBox& a, const TriangleBox& b) {
-            char& flag = crossed[b.triangle];
-            flag = flag || cross(points, some[a.triangle - behind], others[b.triangle]);
-        },
-        kScanBelow);
+    std::vector<char> near = with_area(points, others);
+    for (std::size_t t = 0; t < others.size(); ++t)
+        near[t] = near[t] && bounds.intersects(box_of(points, others[t]));
+    const BoxTree tree(points, others, near);
+    std::vector<char> crossed(others.size(), 0);
+    for (std::size_t s = 0; s < some.size(); ++s)
+        if (area[s])
+            tree.for_each_meeting(box_of(points, some[s]), [&](int t) {
+                crossed[t] = crossed[t] || cross(points, some[s], others[t]);
+            });
     return crossed;
 }
 

@@ -66,7 +66,7 @@ TEST(SelfIntersections, FindsNoneInEmbeddedMeshes) {
     EXPECT_EQ(self_intersections({}), kNone);
     EXPECT_EQ(self_intersections(support::tetrahedron()), kNone);
     EXPECT_EQ(self_intersections(support::icosphere(4)), kNone);
-    EXPECT_EQ(self_intersections(support::torus(150, 61)), kNone);  // several slabs
+    EXPECT_EQ(self_intersections(support::torus(150, 61)), kNone);  // by several threads
 }
 
 TEST(SelfIntersections, TreatsTrianglesWithoutCommonVertices) {
@@ -228,13 +228,13 @@ TEST(SelfIntersections, AgreesWithConstructedIntersectionsOnCrossingSurfaces) {
     const Pairs pairs = self_intersections(mesh);
     EXPECT_GT(pairs.size(), 100u);
     EXPECT_EQ(pairs, intersections_by_construction(mesh));
-    // So many that they are cut into slabs, though one could hold them.
+    // So many that several threads find them.
     const TriangleMesh larger = support::join(support::icosphere(3), support::torus(36, 18, 0.9, 0.3));
     EXPECT_GT(larger.triangles.size(), 2048u);
     EXPECT_EQ(self_intersections(larger), intersections_by_construction(larger));
 }
 
-TEST(SelfIntersections, FindsTheSamePairsWhereverTheSlabsAreCutAndAtAnyThreadCount) {
+TEST(SelfIntersections, FindsTheSamePairsAtAnyThreadCountAndThoseOfLongTriangles) {
     const TriangleMesh a = support::torus(120, 60), b = support::icosphere(4, Vec3(0.9, 0.3, 0.1), 0.7);
     const Pairs pairs = self_intersections(support::join(a, b));
     EXPECT_GT(pairs.size(), 300u);
@@ -245,7 +245,7 @@ TEST(SelfIntersections, FindsTheSamePairsWhereverTheSlabsAreCutAndAtAnyThreadCou
     }
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     EXPECT_EQ(self_intersections(support::join(a, b)), pairs);
-    // Long triangles cross many slabs; one is added through everything, along the axis that is cut.
+    // One is added through everything.
     TriangleMesh pierced = support::join(a, b);
     const int n = static_cast<int>(pierced.points.size());
     pierced.points.insert(pierced.points.end(), {{-3, 0.01, 0.02}, {3, 0.02, 0.03}, {3, 0.1, 0.2}});
