@@ -78,21 +78,31 @@ struct HalfEdge {
 /// Whether the triangles at a vertex are a single fan: from each to the next around it they come back to the
 /// first after all, and no edge is met twice.
 bool is_fan(int v, const Corners& corners, const std::vector<Triangle>& triangles) {
-    const int* begin = corners.corner.data() + corners.first[v];
-    const int* end = corners.corner.data() + corners.first[v + 1];
-    const auto beyond = [&](const int* c, int step) { return triangles[*c / 3][(*c % 3 + step) % 3]; };
-    const int start = beyond(begin, 1);
-    int at = start;
-    for (auto left = end - begin; left > 0; --left) {
-        const int* next = nullptr;
-        for (const int* c = begin; c != end; ++c) {
-            if (beyond(c, 1) != at) continue;
-            if (next) return false;
-            next = c;
+    constexpr int kNext[] = {1, 2, 0};
+    constexpr int kUsual = 16;  // triangles, at most
+    std::array<int, kUsual> usual_from, usual_to;
+    std::vector<int> many;
+    const int begin = corners.first[v], count = corners.first[v + 1] - begin;
+    if (count > kUsual) many.resize(2 * count);
+    // Of the edge opposite v in each.
+    int* const from = count > kUsual ? many.data() : usual_from.data();
+    int* const to = count > kUsual ? many.data() + count : usual_to.data();
+    for (int n = 0; n < count; ++n) {
+        const int corner = corners.corner[begin + n], k = corner % 3;
+        const Triangle& t = triangles[corner / 3];
+        from[n] = t[kNext[k]];
+        to[n] = t[kNext[kNext[k]]];
+    }
+    int at = from[0];
+    for (int left = count; left > 0; --left) {
+        int next = 0, found = 0;
+        for (int n = 0; n < count; ++n) {  // without a branch, which would be mispredicted
+            next += from[n] == at ? n : 0;
+            found += from[n] == at;
         }
-        if (!next) return false;
-        at = beyond(next, 2);
-        if (at == start) return left == 1;
+        if (found != 1) return false;
+        at = to[next];
+        if (at == from[0]) return left == 1;
     }
     return false;
 }
