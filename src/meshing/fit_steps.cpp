@@ -1,13 +1,12 @@
 #include "meshing/fit_steps.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <limits>
 
-#include "meshing/sharpness.h"
+#include "meshing/spoilt_steps.h"
 #include "parallel_for_each.h"
 #include "surface/thread_probes.h"
 
@@ -45,7 +44,6 @@ constexpr Moments kMoments = [] {
 }();
 
 constexpr double kLargestStep = 0.1;  // of the shortest edge around a vertex
-constexpr int kHalvings = 2;          // of the steps around a spoilt triangle, before they are taken back
 constexpr double kSmooth = 0.9;  // cosine between the facets around a vertex and their mean: less is a crease
 constexpr std::size_t kVertexGrain = 256, kTriangleGrain = 64;
 
@@ -91,41 +89,6 @@ struct Share {
     }
 };
 
-/// Whether a triangle turns over by these steps, or gets too sharp and sharper than it was.
-bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const Vec3& b_to,
-            const Vec3& c_to) {
-    // What has no sharp angle after steps of a tenth of its edges has not turned over.
-    if (!is_sharper(kSharpnessAt30Degrees, a_to, b_to, c_to)) return false;
-    const Vec3 area = (b - a).cross(c - a);
-    if (area == Vec3::Zero()) return false;
-    if (!(area.dot((b_to - a_to).cross(c_to - a_to)) > 0.0)) return true;
-    return sharpness(a_to, b_to, c_to) > sharpness(a, b, c);
-}
-
-/// Shortens the steps around triangles that they spoil, and takes them back where that is not enough.
-void undo_spoilt(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-                 const Corners& corners, const std::vector<int>& moving, std::vector<Vec3>& to) {
-    std::vector<char> bad(triangles.size(), 0), back(vertices.size(), 1);
-    for (int pass = 0;; ++pass) {
-        std::atomic<bool> any = false;
-        parallel_for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
-            const auto& [i, j, k] = triangles[t];
-            if (!back[i] && !back[j] && !back[k]) return;  // it was good, or no corner of it moves
-            bad[t] = spoilt(vertices[i], vertices[j], vertices[k], to[i], to[j], to[k]);
-            if (bad[t]) any.store(true, std::memory_order_relaxed);
-        });
-        if (!any) return;
-        if (pass == 0) std::fill(back.begin(), back.end(), 0);
-        parallel_for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
-            const int v = moving[m];
-            back[v] = 0;
-            for (int e = corners.first[v]; e < corners.first[v + 1] && !back[v]; ++e)
-                back[v] = bad[corners.corner[e] / 3];
-            if (back[v]) to[v] = pass < kHalvings ? Vec3(0.5 * (vertices[v] + to[v])) : vertices[v];
-        });
-    }
-}
-
 }  // namespace
 
 void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, const Corners& corners,
@@ -155,11 +118,12 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
         const double trace = quadric.trace();
         quadric.diagonal().array() += damping * trace;
         inverse[m].setZero();
-        if (trace > 0.0) inverse[m] = quadric.ldlt().solve(Mat3::Identity()).cast<float>();
+        if (trace > 0.0) inverse[m] = Mat3(quadric.inverse()).cast<float>();
     });
     std::vector<Vec3> to = vertices;
     std::vector<Eigen::Vector3f> last(moving.size(), Eigen::Vector3f::Zero());  // steps
     ThreadProbes probes(surface);
+    SpoiltSteps spoilt_steps(triangles, corners, movable);
     Pace pace;
     for (int step = 0; step < steps; ++step, pace.next()) {
         parallel_for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
@@ -178,7 +142,7 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
             if (length > limit) move *= limit / length;
             to[v] = vertices[v] + move;
         });
-        undo_spoilt(vertices, triangles, corners, moving, to);
+        spoilt_steps.undo(vertices, to);
         if (step + 1 < steps)
             parallel_for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
                 const auto& [i, j, k] = triangles[t];
