@@ -34,35 +34,43 @@ std::uint64_t spread(std::uint64_t x) {
     return (x | x << 2) & 0x1249249249249249;
 }
 
-/// Numbers of triangles behind their places on Morton's curve, with as many bits as there is room for.
-class CurveKeys {
-public:
-    CurveKeys(const Box& bounds, std::size_t triangles) : low_(bounds.min()) {
-        while (number_bits_ < 32 && triangles >> number_bits_ != 0) ++number_bits_;
-        const int bits = std::min(kMostBits, (64 - number_bits_) / 3);
-        most_ = static_cast<double>((std::uint64_t{1} << bits) - 1);
+/// Sorts numbers of places along Morton's curve in `bounds`, and where many are in one cell of the curve once
+/// more along the curve in theirs. `place`: of a number.
+template <typename Place>
+void sort_along_curve(std::vector<int>::iterator begin, std::vector<int>::iterator end, const Box& bounds,
+                      const Place& place) {
+    constexpr std::size_t kMany = 256, kGrain = 1024;
+    const auto count = static_cast<std::size_t>(end - begin);
+    const double size = bounds.isEmpty() ? 0.0 : bounds.sizes().maxCoeff();
+    if (count < 2 || !(size > 0.0) || !std::isfinite(size)) return;
+    // The key of a cell, with as many bits as there is room for, before where a number was.
+    int behind = 0;
+    while (count >> behind != 0) ++behind;
+    const int bits = std::min(kMostBits, (64 - behind) / 3);
+    const double most = static_cast<double>((std::uint64_t{1} << bits) - 1), scale = most / size;
+    std::vector<std::uint64_t> keys(count);
+    parallel_for_each(count, kGrain, [&](std::size_t i) {
+        const Vec3 p = place(begin[static_cast<std::ptrdiff_t>(i)]);
         for (int axis = 0; axis < 3; ++axis) {
-            const double size = bounds.isEmpty() ? 0.0 : bounds.sizes()[axis];
-            scale_[axis] = size > 0.0 ? most_ / size : 0.0;
+            const double at = (p[axis] - bounds.min()[axis]) * scale;
+            if (at > 0.0) keys[i] |= spread(static_cast<std::uint64_t>(std::min(at, most))) << axis;
         }
+        keys[i] = keys[i] << behind | i;
+    });
+    tbb::parallel_sort(keys.begin(), keys.end());
+    const std::vector<int> before(begin, end);
+    for (std::size_t i = 0; i < count; ++i)
+        begin[static_cast<std::ptrdiff_t>(i)] = before[keys[i] & ((std::uint64_t{1} << behind) - 1)];
+    for (std::size_t first = 0, last = 0; first < count; first = last) {
+        while (last < count && keys[last] >> behind == keys[first] >> behind) ++last;
+        if (last - first < kMany) continue;
+        const auto from = begin + static_cast<std::ptrdiff_t>(first),
+                   to = begin + static_cast<std::ptrdiff_t>(last);
+        Box cell;
+        std::for_each(from, to, [&](int number) { cell.extend(place(number)); });
+        sort_along_curve(from, to, cell, place);
     }
-    std::uint64_t of(const Vec3& place, std::size_t triangle) const {
-        std::uint64_t key = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            const double at = (place[axis] - low_[axis]) * scale_[axis];
-            if (at > 0.0) key |= spread(static_cast<std::uint64_t>(std::min(at, most_))) << axis;
-        }
-        return key << number_bits_ | triangle;
-    }
-    int triangle_of(std::uint64_t key) const {
-        return static_cast<int>(key & ((std::uint64_t{1} << number_bits_) - 1));
-    }
-
-private:
-    Vec3 low_, scale_;
-    double most_;
-    int number_bits_ = 0;
-};
+}
 
 }  // namespace
 
@@ -72,17 +80,13 @@ BoxTree::BoxTree(const std::vector<Vec3>& points, const std::vector<Triangle>& t
     for (const Vec3& p : points) bounds.extend(p);
     if (!bounds.isEmpty()) origin_ = bounds.min();
 
-    constexpr std::size_t kTriangleGrain = 1024, kLeafGrain = 64;
-    constexpr std::uint64_t kNone = ~std::uint64_t{0};
-    const CurveKeys keys(bounds, triangles.size());
-    std::vector<std::uint64_t> order(triangles.size());
-    parallel_for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
-        const Box box = box_of(points, triangles[t]);
-        order[t] = some[t] ? keys.of(box.center(), t) : kNone;
-    });
-    tbb::parallel_sort(order.begin(), order.end());
-    order.resize(
-        static_cast<std::size_t>(std::lower_bound(order.begin(), order.end(), kNone) - order.begin()));
+    constexpr std::size_t kLeafGrain = 64;
+    std::vector<int> order;
+    order.reserve(triangles.size());
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        if (some[t]) order.push_back(static_cast<int>(t));
+    sort_along_curve(order.begin(), order.end(), bounds,
+                     [&](int t) -> Vec3 { return box_of(points, triangles[t]).center(); });
 
     leaves_.resize((order.size() + kPerLeaf - 1) / kPerLeaf);
     while (first_ < leaves_.size()) first_ *= 2, ++levels_;
@@ -95,7 +99,7 @@ BoxTree::BoxTree(const std::vector<Vec3>& points, const std::vector<Triangle>& t
         for (int m = 0; m < kPerLeaf; ++m) {
             Bounds box = empty;
             if (m < leaf.count) {
-                leaf.triangle[m] = keys.triangle_of(order[begin + m]);
+                leaf.triangle[m] = order[begin + m];
                 box = rounded(box_of(points, triangles[leaf.triangle[m]]));
             }
             Bounds& all = bounds_[first_ + l];

@@ -99,15 +99,53 @@ TEST_P(InBoxTree, ThoseThatMeetABoxAreFoundOnce) {
 
 INSTANTIATE_TEST_SUITE_P(Triangles, InBoxTree, ::testing::Values(0, 1, 15, 20, 21, 40, 700));
 
-TEST(BoxTree, TakesTrianglesOfOnePlace) {
+TEST(BoxTree, TellsApartWhatIsInASmallPartOfSpace) {
+    constexpr int kCount = 600;
+    constexpr double kExtent = 1e-6;
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> uniform(-kExtent, kExtent);
     TriangleMesh mesh;
-    mesh.points = {Vec3(1, 2, 3)};
-    mesh.triangles.assign(40, {0, 0, 0});
-    const BoxTree tree(mesh.points, mesh.triangles, std::vector<char>(40, 1));
+    mesh.points = {Vec3(-1, -1, -1), Vec3(0, -1, -1), Vec3(-1, 0, -1)};
+    mesh.triangles = {{0, 1, 2}};
+    for (int t = 1; t < kCount; ++t) {
+        const Vec3 middle(uniform(random), uniform(random), uniform(random));
+        for (int k = 0; k < 3; ++k)
+            mesh.points.push_back(middle + 0.05 * Vec3(uniform(random), uniform(random), uniform(random)));
+        mesh.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+    }
+    const BoxTree tree(mesh.points, mesh.triangles, std::vector<char>(kCount, 1));
+    std::map<std::pair<int, int>, int> found;
+    for (std::size_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
+        tree.for_each_pair_of(leaf, [&](int t, int u) { ++found[std::minmax(t, u)]; });
+    for (int t = 0; t < kCount; ++t)
+        for (int u = t + 1; u < kCount; ++u)
+            if (box_of(mesh.points, mesh.triangles[t]).intersects(box_of(mesh.points, mesh.triangles[u]))) {
+                EXPECT_EQ(found.count({t, u}), 1u);
+            }
+    EXPECT_LT(found.size(), std::size_t{kCount * kCount / 20});
+}
+
+TEST(BoxTree, TakesPlacesFartherApartThanAnyNumber) {
+    TriangleMesh mesh;
+    const double far = 1.7e308;
+    mesh.points = {Vec3(-far, 0, 0), Vec3(far, 0, 0), Vec3(0, far, 1)};
+    mesh.triangles.assign(300, {0, 1, 2});
+    const BoxTree tree(mesh.points, mesh.triangles, std::vector<char>(300, 1));
     int pairs = 0;
     for (std::size_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
         tree.for_each_pair_of(leaf, [&](int, int) { ++pairs; });
-    EXPECT_EQ(pairs, 40 * 39 / 2);
+    EXPECT_EQ(pairs, 300 * 299 / 2);
+}
+
+TEST(BoxTree, TakesTrianglesOfOnePlace) {
+    TriangleMesh mesh;
+    mesh.points = {Vec3(1, 2, 3)};
+    mesh.triangles.assign(300, {0, 0, 0});
+    const BoxTree tree(mesh.points, mesh.triangles, std::vector<char>(300, 1));
+    int pairs = 0;
+    for (std::size_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
+        tree.for_each_pair_of(leaf, [&](int, int) { ++pairs; });
+    EXPECT_EQ(pairs, 300 * 299 / 2);
 }
 
 }  // namespace
