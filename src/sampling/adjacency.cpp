@@ -81,6 +81,10 @@ Adjacency gather(std::size_t count, const ForEachPair& for_each_pair) {
     Adjacency result;
     result.first.resize(count + 1);
     for (std::size_t i = 0; i < count; ++i) result.first[i + 1] = result.first[i] + end[i] - first[i];
+    if (result.first == first) {  // there are none
+        result.adjacent = std::move(second);
+        return result;
+    }
     result.adjacent.resize(result.first[count]);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1024), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i)
@@ -99,12 +103,30 @@ Adjacency from_pairs(const std::vector<std::pair<int, int>>& pairs, std::size_t 
 }
 
 Adjacency ring_of(const std::vector<std::array<int, 3>>& triangles, std::size_t count) {
-    return gather(count, [&](const auto& visit) {
+    const auto for_each_edge = [&](const auto& visit) {
         for (const auto& [a, b, c] : triangles)
-            for (const auto& [i, j] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) {
-                visit(i, j);
-                visit(j, i);
+            for (const auto& [i, j] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) visit(i, j);
+    };
+    // In a mesh without a border each edge comes from one triangle forwards, from another backwards.
+    Adjacency result = gather(count, for_each_edge);
+    constexpr std::size_t kBlock = 1024;
+    const auto is_one_way = [&](int i, int j) {
+        const Adjacency::Range back = result.of(j);
+        return !std::binary_search(back.begin(), back.end(), i);
+    };
+    const auto one_way =
+        find_in_blocks<int>(count, kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
+            for (std::size_t n = begin; n < end; ++n) {
+                const int i = static_cast<int>(n);
+                const Adjacency::Range near = result.of(n);
+                if (std::any_of(near.begin(), near.end(), [&](int j) { return is_one_way(i, j); }))
+                    found.push_back(i);
             }
+        });
+    if (one_way.empty()) return result;
+    return gather(count, [&](const auto& visit) {
+        for_each_edge(visit);
+        for_each_edge([&](int i, int j) { visit(j, i); });
     });
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
 #include <vector>
 
 #include "isotrack/sampling/adjacency.h"
@@ -28,6 +29,29 @@ TEST(Particles, ComeAndGoAndChangePlacesWithAllThatBelongsToThem) {
         EXPECT_EQ(particles.stretch[k], Vec3(i, i, 0));
         EXPECT_EQ(particles.id[k], 10 + i);
         EXPECT_EQ(particles.velocity[k], Vec3(0, 0, i));
+    }
+}
+
+TEST(Adjacency, RingOfClosedMeshesAndOfSuchAsAreTurned) {
+    // An octahedron around the axis from 4 to 5; then with a triangle turned over, one missing, one twice.
+    std::vector<std::array<int, 3>> triangles;
+    for (int i = 0; i < 4; ++i) {
+        triangles.push_back({i, (i + 1) % 4, 4});
+        triangles.push_back({(i + 1) % 4, i, 5});
+    }
+    for (int change = 0; change < 4; ++change) {
+        if (change == 1) std::swap(triangles[2][0], triangles[2][1]);
+        if (change == 2) triangles.pop_back();
+        if (change == 3) triangles.push_back(triangles.front());
+        const Adjacency ring = ring_of(triangles, 7);
+        for (int i = 0; i < 6; ++i) {
+            const int opposite = i < 4 ? (i + 2) % 4 : 9 - i;
+            std::vector<int> expected;
+            for (int j = 0; j < 6; ++j)
+                if (j != i && j != opposite) expected.push_back(j);
+            EXPECT_EQ(std::vector<int>(ring.of(i).begin(), ring.of(i).end()), expected) << change;
+        }
+        EXPECT_EQ(ring.of(6).size(), 0u);
     }
 }
 
