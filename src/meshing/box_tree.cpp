@@ -37,8 +37,8 @@ std::uint64_t spread(std::uint64_t x) {
 /// Sorts numbers of places along Morton's curve in `bounds`, and where many are in one cell of the curve once
 /// more along the curve in theirs. `place`: of a number.
 template <typename Place>
-void sort_along_curve(std::vector<int>::iterator begin, std::vector<int>::iterator end, const Box& bounds,
-                      const Place& place) {
+void sort_along_morton(std::vector<int>::iterator begin, std::vector<int>::iterator end, const Box& bounds,
+                       const Place& place) {
     constexpr std::size_t kMany = 256, kGrain = 1024;
     const auto count = static_cast<std::size_t>(end - begin);
     const double size = bounds.isEmpty() ? 0.0 : bounds.sizes().maxCoeff();
@@ -68,7 +68,7 @@ void sort_along_curve(std::vector<int>::iterator begin, std::vector<int>::iterat
                    to = begin + static_cast<std::ptrdiff_t>(last);
         Box cell;
         std::for_each(from, to, [&](int number) { cell.extend(place(number)); });
-        sort_along_curve(from, to, cell, place);
+        sort_along_morton(from, to, cell, place);
     }
 }
 
@@ -85,8 +85,8 @@ BoxTree::BoxTree(const std::vector<Vec3>& points, const std::vector<Triangle>& t
     order.reserve(triangles.size());
     for (std::size_t t = 0; t < triangles.size(); ++t)
         if (some[t]) order.push_back(static_cast<int>(t));
-    sort_along_curve(order.begin(), order.end(), bounds,
-                     [&](int t) -> Vec3 { return box_of(points, triangles[t]).center(); });
+    sort_along_morton(order.begin(), order.end(), bounds,
+                      [&](int t) -> Vec3 { return box_of(points, triangles[t]).center(); });
 
     leaves_.resize((order.size() + kPerLeaf - 1) / kPerLeaf);
     while (first_ < leaves_.size()) first_ *= 2, ++levels_;

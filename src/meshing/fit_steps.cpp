@@ -51,7 +51,7 @@ constexpr std::size_t kVertexGrain = 256, kTriangleGrain = 64;
 /// 1961]. A vertex that solves a quadric of its own leaves out that its neighbours move as well. What it
 /// solves for are the row sums of the normal equations: times the inverse of these, the equations have
 /// eigenvalues from kLeast, those of a triangle's corners against each other, to 1, of all alike.
-class Pace {
+class Chebyshev {
 public:
     double length() const { return length_; }
     double again() const { return again_; }
@@ -124,7 +124,7 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
     std::vector<Eigen::Vector3f> last(moving.size(), Eigen::Vector3f::Zero());  // steps
     ThreadProbes probes(surface);
     SpoiltSteps spoilt_steps(triangles, corners, movable);
-    Pace pace;
+    Chebyshev pace;
     for (int step = 0; step < steps; ++step, pace.next()) {
         parallel_for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
             const int v = moving[m];

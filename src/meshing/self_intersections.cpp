@@ -1,6 +1,7 @@
 #include "isotrack/meshing/self_intersections.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <string>
@@ -152,19 +153,19 @@ bool any_cross(const std::vector<Vec3>& points, const std::vector<Triangle>& som
 
 std::vector<char> crossed_by(const std::vector<Vec3>& points, const std::vector<Triangle>& some,
                              const std::vector<Triangle>& others) {
-    const std::vector<char> area = with_area(points, some);
-    Box bounds;
-    for (const Triangle& t : some) bounds.extend(box_of(points, t));
-    std::vector<char> near = with_area(points, others);
-    for (std::size_t t = 0; t < others.size(); ++t)
-        near[t] = near[t] && bounds.intersects(box_of(points, others[t]));
-    const BoxTree tree(points, others, near);
     std::vector<char> crossed(others.size(), 0);
-    for (std::size_t s = 0; s < some.size(); ++s)
-        if (area[s])
-            tree.for_each_meeting(box_of(points, some[s]), [&](int t) {
-                crossed[t] = crossed[t] || cross(points, some[s], others[t]);
-            });
+    tbb::this_task_arena::isolate([&] {
+        Box bounds;
+        for (const Triangle& t : some) bounds.extend(box_of(points, t));
+        std::vector<char> near = with_area(points, others);
+        for (std::size_t t = 0; t < others.size(); ++t)
+            near[t] = near[t] && bounds.intersects(box_of(points, others[t]));
+        const BoxTree tree(points, others, near);
+        for (const Triangle& s : some)
+            if (has_area(points[s[0]], points[s[1]], points[s[2]]))
+                tree.for_each_meeting(box_of(points, s),
+                                      [&](int t) { crossed[t] = crossed[t] || cross(points, s, others[t]); });
+    });
     return crossed;
 }
 

@@ -9,26 +9,6 @@
 
 namespace isotrack {
 
-/// Numbers below a limit, each once.
-class Numbers {
-public:
-    explicit Numbers(std::size_t limit) : has_(limit, 0) {}
-    void add(int n) {
-        if (has_[n]) return;
-        has_[n] = 1;
-        list_.push_back(n);
-    }
-    const std::vector<int>& list() const { return list_; }
-    void clear() {
-        for (const int n : list_) has_[n] = 0;
-        list_.clear();
-    }
-
-private:
-    std::vector<char> has_;
-    std::vector<int> list_;  // in the order in which they came
-};
-
 /// Steps that turn a triangle over, or give it an angle below 30 degrees that is smaller than it was. Of one
 /// mesh, with memory of its own from step to step.
 class SpoiltSteps {
@@ -48,6 +28,26 @@ public:
     void undo(const std::vector<Vec3>& vertices, std::vector<Vec3>& to);
 
 private:
+    /// Numbers below a limit, each once.
+    class Numbers {
+    public:
+        explicit Numbers(std::size_t limit) : has_(limit, 0) {}
+        void add(int n) {
+            if (has_[n]) return;
+            has_[n] = 1;
+            list_.push_back(n);
+        }
+        const std::vector<int>& list() const { return list_; }
+        void clear() {
+            for (const int n : list_) has_[n] = 0;
+            list_.clear();
+        }
+
+    private:
+        std::vector<char> has_;
+        std::vector<int> list_;  // in the order in which they came
+    };
+
     const std::vector<Triangle>& triangles_;
     const Corners& corners_;
     const std::vector<char>& movable_;

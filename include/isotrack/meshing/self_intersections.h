@@ -26,7 +26,8 @@ inline std::vector<std::pair<int, int>> self_intersections(const TriangleMesh& m
 bool any_cross(const std::vector<Vec3>& points, const std::vector<Triangle>& some,
                const std::vector<Triangle>& others);
 
-/// Flags for those of `others` that make a pair with one of `some`. Points must be finite. By one thread.
+/// Flags for those of `others` that make a pair with one of `some`. Points must be finite. Uses TBB inside; a
+/// thread that waits there takes up nothing else meanwhile.
 std::vector<char> crossed_by(const std::vector<Vec3>& points, const std::vector<Triangle>& some,
                              const std::vector<Triangle>& others);
 
