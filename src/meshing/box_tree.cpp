@@ -1,11 +1,11 @@
 #include "meshing/box_tree.h"
 
-#include <tbb/parallel_sort.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
+#include "delaunay/spatial_order.h"
 #include "meshing/triangle_box.h"
 #include "parallel_for_each.h"
 
@@ -23,53 +23,30 @@ float rounded_up(double x) {
     return -rounded_down(-x);
 }
 
-constexpr int kMostBits = 21;  // of a coordinate
-
-/// With two zero bits behind each of the lowest 21.
-std::uint64_t spread(std::uint64_t x) {
-    x = (x | x << 32) & 0x1f00000000ffff;
-    x = (x | x << 16) & 0x1f0000ff0000ff;
-    x = (x | x << 8) & 0x100f00f00f00f00f;
-    x = (x | x << 4) & 0x10c30c30c30c30c3;
-    return (x | x << 2) & 0x1249249249249249;
-}
-
-/// Sorts numbers of places along Morton's curve in `bounds`, and where many are in one cell of the curve once
-/// more along the curve in theirs. `place`: of a number.
-template <typename Place>
-void sort_along_morton(std::vector<int>::iterator begin, std::vector<int>::iterator end, const Box& bounds,
-                       const Place& place) {
-    constexpr std::size_t kMany = 256, kGrain = 1024;
-    const auto count = static_cast<std::size_t>(end - begin);
-    const double size = bounds.isEmpty() ? 0.0 : bounds.sizes().maxCoeff();
-    if (count < 2 || !(size > 0.0) || !std::isfinite(size)) return;
-    // The key of a cell, with as many bits as there is room for, before where a number was.
-    int behind = 0;
-    while (count >> behind != 0) ++behind;
-    const int bits = std::min(kMostBits, (64 - behind) / 3);
-    const double most = static_cast<double>((std::uint64_t{1} << bits) - 1), scale = most / size;
-    std::vector<std::uint64_t> keys(count);
-    parallel_for_each(count, kGrain, [&](std::size_t i) {
-        const Vec3 p = place(begin[static_cast<std::ptrdiff_t>(i)]);
-        for (int axis = 0; axis < 3; ++axis) {
-            const double at = (p[axis] - bounds.min()[axis]) * scale;
-            if (at > 0.0) keys[i] |= spread(static_cast<std::uint64_t>(std::min(at, most))) << axis;
-        }
-        keys[i] = keys[i] << behind | i;
+/// Those with a flag, in the order of the first of their vertices along Hilbert's curve.
+std::vector<int> order_along_curve(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                                   const std::vector<char>& some) {
+    const auto for_each = [&](const auto& visit) {
+        for (std::size_t t = 0; t < triangles.size(); ++t)
+            if (some[t]) visit(static_cast<int>(t), triangles[t]);
+    };
+    std::vector<int> vertices, rank(points.size(), -1);
+    for_each([&](int, const Triangle& corners) {
+        for (const int v : corners)
+            if (rank[v] < 0) {
+                rank[v] = 0;
+                vertices.push_back(v);
+            }
     });
-    tbb::parallel_sort(keys.begin(), keys.end());
-    const std::vector<int> before(begin, end);
-    for (std::size_t i = 0; i < count; ++i)
-        begin[static_cast<std::ptrdiff_t>(i)] = before[keys[i] & ((std::uint64_t{1} << behind) - 1)];
-    for (std::size_t first = 0, last = 0; first < count; first = last) {
-        while (last < count && keys[last] >> behind == keys[first] >> behind) ++last;
-        if (last - first < kMany) continue;
-        const auto from = begin + static_cast<std::ptrdiff_t>(first),
-                   to = begin + static_cast<std::ptrdiff_t>(last);
-        Box cell;
-        std::for_each(from, to, [&](int number) { cell.extend(place(number)); });
-        sort_along_morton(from, to, cell, place);
-    }
+    sort_along_curve(points, vertices);
+    for (std::size_t n = 0; n < vertices.size(); ++n) rank[vertices[n]] = static_cast<int>(n);
+    const auto first_of = [&](const Triangle& t) { return std::min({rank[t[0]], rank[t[1]], rank[t[2]]}); };
+    std::vector<int> end(vertices.size() + 1, 0);  // of those that are placed
+    for_each([&](int, const Triangle& corners) { ++end[first_of(corners) + 1]; });
+    std::partial_sum(end.begin(), end.end(), end.begin());
+    std::vector<int> result(end.back());
+    for_each([&](int t, const Triangle& corners) { result[end[first_of(corners)]++] = t; });
+    return result;
 }
 
 }  // namespace
@@ -81,13 +58,7 @@ BoxTree::BoxTree(const std::vector<Vec3>& points, const std::vector<Triangle>& t
     if (!bounds.isEmpty()) origin_ = bounds.min();
 
     constexpr std::size_t kLeafGrain = 64;
-    std::vector<int> order;
-    order.reserve(triangles.size());
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        if (some[t]) order.push_back(static_cast<int>(t));
-    sort_along_morton(order.begin(), order.end(), bounds,
-                      [&](int t) -> Vec3 { return box_of(points, triangles[t]).center(); });
-
+    const std::vector<int> order = order_along_curve(points, triangles, some);
     leaves_.resize((order.size() + kPerLeaf - 1) / kPerLeaf);
     while (first_ < leaves_.size()) first_ *= 2, ++levels_;
     const Bounds empty{{kInfinite, kInfinite, kInfinite}, {-kInfinite, -kInfinite, -kInfinite}};

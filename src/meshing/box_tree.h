@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "isotrack/types.h"
@@ -11,7 +10,7 @@
 namespace isotrack {
 
 /// The bounding boxes of some triangles, in a balanced binary tree over leaves of those that follow each
-/// other along Morton's curve. Boxes are in floats from the least corner of all points on, rounded outwards:
+/// other along Hilbert's curve. Boxes are in floats from the least corner of all points on, rounded outwards:
 /// those less than 2e-7 of the extent of all points apart may be said to meet. Some 32 bytes a triangle, 36
 /// while it is made. Read-only, so threads may share it.
 class BoxTree {

@@ -71,10 +71,6 @@ std::vector<int> TriangleBins::meeting(const Box& box) const {
     return result;
 }
 
-bool TriangleBins::any_meets(const Box& box) const {
-    return any_in(range_of(box), [&](int t) { return box_of(t).intersects(box); });
-}
-
 TriangleBins::Range TriangleBins::range_of(const Box& box) const {
     // What is not below 0 is rounded down by being made a whole number; floor is a call for each.
     const auto cube_at = [&](const Vec3& p) -> Eigen::Array3i {

@@ -22,8 +22,6 @@ public:
 
     /// Those whose boxes meet this one, ascending.
     std::vector<int> meeting(const Box& box) const;
-    /// Whether there are any.
-    bool any_meets(const Box& box) const;
 
     /// Calls `visit(triangle)` with those in the cube of a place and others near, then with those in more
     /// cubes, and so on, some more than once: until `is_enough(distance)` holds for a distance within which
@@ -44,24 +42,15 @@ private:
         Eigen::Array3i from, to;  // inclusive
     };
     Range range_of(const Box& box) const;
-    template <typename Test>
-    bool any_in(const Range& range, const Test& test) const {
+    template <typename Visit>
+    void for_each_in(const Range& range, const Visit& visit) const {
         for (int x = range.from.x(); x <= range.to.x(); ++x)
             for (int y = range.from.y(); y <= range.to.y(); ++y)
                 for (int z = range.from.z(); z <= range.to.z(); ++z) {
                     const std::size_t cube = number(x, y, z);
-                    if (std::any_of(members_.begin() + first_[cube], members_.begin() + first_[cube + 1],
-                                    test))
-                        return true;
+                    std::for_each(members_.begin() + first_[cube], members_.begin() + first_[cube + 1],
+                                  visit);
                 }
-        return false;
-    }
-    template <typename Visit>
-    void for_each_in(const Range& range, const Visit& visit) const {
-        any_in(range, [&](int t) {
-            visit(t);
-            return false;
-        });
     }
     std::size_t number(int x, int y, int z) const {
         return (static_cast<std::size_t>(x) * count_.y() + y) * count_.z() + z;

@@ -35,6 +35,14 @@ TriangleMesh strewn(int count) {
     return mesh;
 }
 
+/// How often each pair is found.
+std::map<std::pair<int, int>, int> pairs_in(const BoxTree& tree) {
+    std::map<std::pair<int, int>, int> found;
+    for (std::size_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
+        tree.for_each_pair_of(leaf, [&](int t, int u) { ++found[std::minmax(t, u)]; });
+    return found;
+}
+
 class InBoxTree : public ::testing::TestWithParam<int> {
 protected:
     /// All but every fifth triangle.
@@ -55,10 +63,7 @@ protected:
 };
 
 TEST_P(InBoxTree, PairsThatMeetAreFoundOnce) {
-    const BoxTree tree(mesh.points, mesh.triangles, some);
-    std::map<std::pair<int, int>, int> found;
-    for (std::size_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
-        tree.for_each_pair_of(leaf, [&](int t, int u) { ++found[std::minmax(t, u)]; });
+    const auto found = pairs_in(BoxTree(mesh.points, mesh.triangles, some));
     std::size_t meeting = 0;
     for (int t = 0; t < GetParam(); ++t)
         for (int u = t + 1; u < GetParam(); ++u) {
@@ -113,10 +118,7 @@ TEST(BoxTree, TellsApartWhatIsInASmallPartOfSpace) {
             mesh.points.push_back(middle + 0.05 * Vec3(uniform(random), uniform(random), uniform(random)));
         mesh.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
     }
-    const BoxTree tree(mesh.points, mesh.triangles, std::vector<char>(kCount, 1));
-    std::map<std::pair<int, int>, int> found;
-    for (std::size_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
-        tree.for_each_pair_of(leaf, [&](int t, int u) { ++found[std::minmax(t, u)]; });
+    const auto found = pairs_in(BoxTree(mesh.points, mesh.triangles, std::vector<char>(kCount, 1)));
     for (int t = 0; t < kCount; ++t)
         for (int u = t + 1; u < kCount; ++u)
             if (box_of(mesh.points, mesh.triangles[t]).intersects(box_of(mesh.points, mesh.triangles[u]))) {
@@ -130,22 +132,16 @@ TEST(BoxTree, TakesPlacesFartherApartThanAnyNumber) {
     const double far = 1.7e308;
     mesh.points = {Vec3(-far, 0, 0), Vec3(far, 0, 0), Vec3(0, far, 1)};
     mesh.triangles.assign(300, {0, 1, 2});
-    const BoxTree tree(mesh.points, mesh.triangles, std::vector<char>(300, 1));
-    int pairs = 0;
-    for (std::size_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
-        tree.for_each_pair_of(leaf, [&](int, int) { ++pairs; });
-    EXPECT_EQ(pairs, 300 * 299 / 2);
+    EXPECT_EQ(pairs_in(BoxTree(mesh.points, mesh.triangles, std::vector<char>(300, 1))).size(),
+              300u * 299u / 2u);
 }
 
 TEST(BoxTree, TakesTrianglesOfOnePlace) {
     TriangleMesh mesh;
     mesh.points = {Vec3(1, 2, 3)};
     mesh.triangles.assign(300, {0, 0, 0});
-    const BoxTree tree(mesh.points, mesh.triangles, std::vector<char>(300, 1));
-    int pairs = 0;
-    for (std::size_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
-        tree.for_each_pair_of(leaf, [&](int, int) { ++pairs; });
-    EXPECT_EQ(pairs, 300 * 299 / 2);
+    EXPECT_EQ(pairs_in(BoxTree(mesh.points, mesh.triangles, std::vector<char>(300, 1))).size(),
+              300u * 299u / 2u);
 }
 
 }  // namespace
