@@ -1,6 +1,6 @@
 // OpenVDB 10 believes every length a file states: 300 bytes of a file cut off inside its header make it ask
 // for gigabytes, and a block of voxels with a wrong length overruns its buffer. So the head of the file is
-// read here, each length checked against what is left, the tree is checked by `check_vdb_tree`, and OpenVDB
+// read here, each length checked against what is left, the tree is checked by a `VdbTreeWalk`, and OpenVDB
 // gets the checked bytes of one grid's tree and nothing else. Format: openvdb/io/Archive.cc,
 // io/GridDescriptor.cc and MetaMap.cc of OpenVDB 10.0.1.
 #include "isotrack/io/vdb_file.h"
@@ -21,9 +21,8 @@
 #include <sstream>
 #include <string_view>
 
-#include "io/system_memory.h"
-#include "io/vdb_tree_check.h"
 #include "io/vdb_tree_read.h"
+#include "io/vdb_tree_walk.h"
 #include "isotrack/error.h"
 
 namespace isotrack {
@@ -156,7 +155,8 @@ private:
     void read_transform(Record& record);
     openvdb::MetaMap read_metadata(const std::string& owner);
     void read_entry(openvdb::MetaMap& metadata, const std::string& name, const std::string& type);
-    SystemMemory tree_bytes(const Record& record);
+    VdbTreeWalk walk_tree(const Record& record, const VdbValueLayout& layout);
+    std::int64_t end_of_tree(const Record& record, const VdbValueLayout& layout);
     openvdb::GridBase::Ptr read_voxels(const Record& record);
 
     std::int64_t position() { return static_cast<std::int64_t>(stream_.tellg()); }
@@ -334,9 +334,7 @@ void VdbFile::find_streamed_grids() {
         Record& last = grids_.back();
         const std::optional<VdbValueLayout> layout = layout_of(last);
         if (!layout || !last.transform) return;  // where the next grid begins is not known
-        const std::size_t length =
-            last.parent.empty() ? check_vdb_tree(tree_bytes(last).view(), *layout).end : 0;
-        last.end_pos = last.tree_pos + static_cast<std::int64_t>(length);
+        last.end_pos = last.parent.empty() ? end_of_tree(last, *layout) : last.tree_pos;
         stream_.seekg(last.end_pos);
         Record next = read_descriptor(i);
         next.grid_pos = position();
@@ -346,12 +344,18 @@ void VdbFile::find_streamed_grids() {
     }
 }
 
-SystemMemory VdbFile::tree_bytes(const Record& record) {
+VdbTreeWalk VdbFile::walk_tree(const Record& record, const VdbValueLayout& layout) {
     limit_ = size_;
     stream_.seekg(record.tree_pos);
-    SystemMemory bytes(static_cast<std::size_t>(record.end_pos - record.tree_pos));
-    stream_.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    return bytes;
+    return {static_cast<std::uint64_t>(record.end_pos - record.tree_pos), layout,
+            [this](char* to, std::size_t count) { stream_.read(to, static_cast<std::streamsize>(count)); }};
+}
+
+std::int64_t VdbFile::end_of_tree(const Record& record, const VdbValueLayout& layout) {
+    VdbTreeWalk walk = walk_tree(record, layout);
+    walk.topology();
+    while (!walk.next_buffers().begin.empty()) continue;
+    return record.tree_pos + static_cast<std::int64_t>(walk.position());
 }
 
 openvdb::GridBase::Ptr VdbFile::read(const Record& record) {
@@ -383,9 +387,8 @@ openvdb::GridBase::Ptr VdbFile::read_voxels(const Record& record) {
     grid->setTransform(record.transform);
     if (!record.parent.empty()) return grid;
 
-    const SystemMemory bytes = tree_bytes(record);
-    const VdbTreeExtent extent = check_vdb_tree(bytes.view(), *layout);
-    read_vdb_tree(*grid, bytes.view(), extent, {library_version_, file_version_, record.compression});
+    VdbTreeWalk walk = walk_tree(record, *layout);
+    read_vdb_tree(*grid, walk, {library_version_, file_version_, record.compression});
     return grid;
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <stdexcept>
 #include <streambuf>
+#include <string_view>
 
 namespace isotrack {
 namespace {
@@ -60,24 +61,29 @@ private:
 
 }  // namespace
 
-void read_vdb_tree(openvdb::GridBase& grid, std::string_view bytes, const VdbTreeExtent& extent,
-                   const VdbTreeFormat& format) {
-    grid.readTopology(TreeStream(bytes, grid, format).get());
+void read_vdb_tree(openvdb::GridBase& grid, VdbTreeWalk& walk, const VdbTreeFormat& format) {
+    grid.readTopology(TreeStream(walk.topology(), grid, format).get());
     const auto read_leaves = [&](auto& typed) {
         auto& tree = typed.tree();
         const openvdb::tree::LeafManager leaves(tree);
         const std::size_t count = leaves.leafCount();
-        if (count != extent.leaves.size()) throw std::runtime_error("its tree has other leaves than it says");
+        if (count != walk.leaf_count()) throw std::runtime_error("its tree has other leaves than it says");
         for (std::size_t n = 0; n < count; ++n) leaves.leaf(n).buffer().allocate();
         const bool half = grid.saveFloatAsHalf();
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kLeaves), [&](const auto& range) {
-            TreeStream stream(bytes, grid, format);
-            openvdb::io::setGridBackgroundValuePtr(stream.get(), &tree.background());
-            for (std::size_t n = range.begin(); n < range.end(); ++n) {
-                stream.get().seekg(static_cast<std::streamoff>(extent.leaves[n]));
-                leaves.leaf(n).readBuffers(stream.get(), half);
-            }
-        });
+        std::size_t first = 0;  // of the next buffers
+        const auto read_next = [&](const VdbTreeWalk::Buffers& buffers) {
+            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, buffers.begin.size(), kLeaves),
+                              [&](const auto& range) {
+                                  TreeStream stream(buffers.bytes, grid, format);
+                                  openvdb::io::setGridBackgroundValuePtr(stream.get(), &tree.background());
+                                  for (std::size_t n = range.begin(); n < range.end(); ++n) {
+                                      stream.get().seekg(static_cast<std::streamoff>(buffers.begin[n]));
+                                      leaves.leaf(first + n).readBuffers(stream.get(), half);
+                                  }
+                              });
+            first += buffers.begin.size();
+        };
+        while (first < count) read_next(walk.next_buffers());
     };
     using Grids =
         openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Vec3SGrid, openvdb::Vec3DGrid>;

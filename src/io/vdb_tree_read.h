@@ -1,12 +1,11 @@
-// The tree of a VDB grid, from bytes that were checked.
+// The tree of a VDB grid, from bytes that are checked.
 #pragma once
 
 #include <openvdb/openvdb.h>
 
 #include <cstdint>
-#include <string_view>
 
-#include "io/vdb_tree_check.h"
+#include "io/vdb_tree_walk.h"
 
 namespace isotrack {
 
@@ -17,11 +16,10 @@ struct VdbTreeFormat {
     std::uint32_t compression;  ///< OpenVDB's flags.
 };
 
-/// Reads the tree, of float, double or vectors of three of them, into `grid`, whose class and metadata are
-/// set. `extent`: what `check_vdb_tree` says of these bytes. The values of leaves are read by several threads
-/// of TBB, into memory that this thread allocates. \throws std::runtime_error when it is of another type or
-/// has other leaves, and what OpenVDB does, from any thread.
-void read_vdb_tree(openvdb::GridBase& grid, std::string_view bytes, const VdbTreeExtent& extent,
-                   const VdbTreeFormat& format);
+/// Reads the tree, of float, double or vectors of three of them, that `walk` is at the beginning of, into
+/// `grid`, whose class and metadata are set. The values of leaves are read by several threads of TBB, into
+/// memory that this thread allocates. \throws std::runtime_error when it is of another type or has other
+/// leaves, what the walk does, and what OpenVDB does, from any thread.
+void read_vdb_tree(openvdb::GridBase& grid, VdbTreeWalk& walk, const VdbTreeFormat& format);
 
 }  // namespace isotrack

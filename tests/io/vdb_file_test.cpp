@@ -249,11 +249,53 @@ TEST_F(VdbFileTest, ReadsManyLeavesAsOpenVdbDoes) {
         }
 }
 
-TEST_F(VdbFileTest, RefusesADamagedBlockAmongMany) {
+/// More of it than is read at once.
+openvdb::FloatGrid::Ptr large_sphere() {
     const auto sphere =
         openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(60.f, openvdb::Vec3f(3.f), 1.f);
     sphere->setName("phi");
-    write_vdb(file(), {sphere}, openvdb::io::COMPRESS_BLOSC);
+    return sphere;
+}
+
+TEST_F(VdbFileTest, FindsTheEndOfALargeTreeInAStream) {
+    const auto first = large_sphere();
+    const auto second = small_sphere("second");
+    std::ofstream out(file(), std::ios::binary);
+    openvdb::io::Stream(out).write(openvdb::GridCPtrVec{first, second});
+    out.close();
+    const std::vector<GridInfo> grids = list_grids(file());
+    ASSERT_EQ(grids.size(), 2u);
+    expect_same_values(*openvdb::gridPtrCast<openvdb::FloatGrid>(read_grid(file(), grids[0])), *first);
+    expect_same_values(*openvdb::gridPtrCast<openvdb::FloatGrid>(read_grid(file(), grids[1])), *second);
+}
+
+TEST_F(VdbFileTest, RefusesAWrongLengthOfTheLastOfManyBlocks) {
+    write_vdb(file(), {large_sphere()}, openvdb::io::COMPRESS_BLOSC);
+    std::string bytes = read_bytes(file());
+    ASSERT_GT(bytes.size(), 1'000'000u);
+    // The length is where it leads to the end.
+    std::size_t at = bytes.size() - sizeof(std::int64_t) - 16;
+    const auto length_there = [&] {
+        std::int64_t length;
+        std::memcpy(&length, &bytes[at], sizeof(length));
+        return length;
+    };
+    while (at > bytes.size() - 4096 &&
+           length_there() != static_cast<std::int64_t>(bytes.size() - at - sizeof(std::int64_t)))
+        --at;
+    ASSERT_GT(at, bytes.size() - 4096);
+    for (const std::int64_t off : {1, -1}) {
+        std::string wrong = bytes;
+        const std::int64_t length = length_there() + off;
+        std::memcpy(&wrong[at], &length, sizeof(length));
+        const std::string path = with(wrong);
+        const std::string message = refusal(path, [&] { read_grid(path, list_grids(path)[0]); });
+        EXPECT_NE(message.find(off > 0 ? "end too early" : "wrong header"), std::string::npos) << message;
+    }
+}
+
+TEST_F(VdbFileTest, RefusesADamagedBlockAmongMany) {
+    write_vdb(file(), {large_sphere()}, openvdb::io::COMPRESS_BLOSC);
     std::string bytes = read_bytes(file());
     std::fill(bytes.end() - 100, bytes.end(), '\xff');  // in the last block, whose lengths stay
     const std::string path = with(bytes);
