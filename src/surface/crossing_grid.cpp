@@ -58,16 +58,12 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     if (crossings.size == 0) return;
     const std::size_t columns = first_.size() - 1;
     // Each goes to the next free place of its column, in any order: they are sorted then. To make them takes
-    // longer than anything else here, so they are held twice; a frame needs its most memory later. At first
-    // in blocks, which fit into holes of the heap.
-    constexpr std::size_t kBlock = 4096;
-    std::vector<std::vector<Entry>> blocks;
-    for (std::size_t c = 0; c < crossings.size; c += kBlock)
-        blocks.emplace_back(std::min(kBlock, crossings.size - c));
-    const auto made = [&](std::size_t c) -> Entry& { return blocks[c / kBlock][c % kBlock]; };
+    // longer than anything else here, so they are held twice; a frame needs its most memory later.
+    Entries made;
+    made.resize(crossings.size);
     std::vector<std::atomic<std::uint32_t>> next(columns);
     Directions directions;
-    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, kBlock);
+    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, Entries::kBlock);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         std::vector<std::pair<Eigen::Vector3f, std::uint32_t>> known;
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
@@ -77,7 +73,7 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
             if (direction == known.end())
                 direction =
                     known.insert(known.end(), {crossing.outward, directions.number_of(crossing.outward)});
-            Entry& entry = made(c);
+            Entry& entry = made[c];
             entry = {(crossing.point - origin_).cast<float>(), direction->second,
                      static_cast<std::uint32_t>(crossing.stands_for), crossing.flat};
             next[column_of(entry.offset)].fetch_add(1, std::memory_order_relaxed);
@@ -99,20 +95,23 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     entries_.resize(crossings.size);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
-            const std::size_t column = column_of(made(c).offset);
+            const std::size_t column = column_of(made[c].offset);
             Entry& entry = entries_[first_[column] + next[column].fetch_add(1, std::memory_order_relaxed)];
-            entry = made(c);
+            entry = made[c];
             entry.direction = sorted[entry.direction];
         }
     });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns, 256), [&](const auto& range) {
-        for (std::size_t c = range.begin(); c < range.end(); ++c)
-            std::sort(entries_.begin() + static_cast<std::ptrdiff_t>(first_[c]),
-                      entries_.begin() + static_cast<std::ptrdiff_t>(first_[c + 1]),
-                      [](const Entry& a, const Entry& b) {
-                          return std::make_tuple(a.offset.z(), a.offset.x(), a.offset.y(), a.direction) <
-                                 std::make_tuple(b.offset.z(), b.offset.x(), b.offset.y(), b.direction);
-                      });
+        std::vector<Entry> column;  // which may be parts of two blocks
+        for (std::size_t c = range.begin(); c < range.end(); ++c) {
+            column.clear();
+            for (std::size_t e = first_[c]; e < first_[c + 1]; ++e) column.push_back(entries_[e]);
+            std::sort(column.begin(), column.end(), [](const Entry& a, const Entry& b) {
+                return std::make_tuple(a.offset.z(), a.offset.x(), a.offset.y(), a.direction) <
+                       std::make_tuple(b.offset.z(), b.offset.x(), b.offset.y(), b.direction);
+            });
+            for (std::size_t e = first_[c]; e < first_[c + 1]; ++e) entries_[e] = column[e - first_[c]];
+        }
     });
 }
 
@@ -134,10 +133,10 @@ CrossingGrid CrossingGrid::some(std::vector<int>& numbers) const {
     tbb::parallel_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
         return std::tie(a.column, a.z, a.number) < std::tie(b.column, b.z, b.number);
     });
-    result.entries_.reserve(places.size());
+    result.entries_.resize(places.size());
     for (std::size_t i = 0; i < places.size(); ++i) {
         numbers[i] = places[i].number;
-        result.entries_.push_back(entries_[places[i].number]);
+        result.entries_[i] = entries_[places[i].number];
     }
     result.directions_ = directions_;
     return result;

@@ -51,14 +51,21 @@ public:
         for (int x = column(0, low.x()); x <= to[0]; ++x)
             for (int y = column(1, low.y()); y <= to[1]; ++y) {
                 const std::size_t at = static_cast<std::size_t>(x) * count_[1] + y;
-                const auto end = entries_.begin() + static_cast<std::ptrdiff_t>(first_[at + 1]);
-                auto e =
-                    std::lower_bound(entries_.begin() + static_cast<std::ptrdiff_t>(first_[at]), end, low.z(),
-                                     [](const Entry& entry, double z) { return entry.offset.z() < z; });
-                for (; e != end && e->offset.z() <= high.z(); ++e)
-                    if (e->offset.x() >= low.x() && e->offset.x() <= high.x() && e->offset.y() >= low.y() &&
-                        e->offset.y() <= high.y())
-                        visit(static_cast<std::size_t>(e - entries_.begin()));
+                const std::size_t end = first_[at + 1];
+                std::size_t c = first_[at];
+                for (std::size_t left = end - c; left > 0;) {  // to the first that is not below the box
+                    const std::size_t half = left / 2;
+                    const bool below = entries_[c + half].offset.z() < low.z();
+                    if (below) c += half + 1;
+                    left = below ? left - half - 1 : half;
+                }
+                for (; c < end; ++c) {
+                    const Eigen::Vector3f& offset = entries_[c].offset;
+                    if (offset.z() > high.z()) break;
+                    if (offset.x() >= low.x() && offset.x() <= high.x() && offset.y() >= low.y() &&
+                        offset.y() <= high.y())
+                        visit(c);
+                }
             }
     }
 
@@ -74,6 +81,25 @@ private:
         std::uint32_t direction : 16;  // number among directions_
         std::uint32_t stands_for : 15, flat : 1;
     };
+    /// Many of them, in blocks, which fit into holes of the heap.
+    class Entries {
+    public:
+        void resize(std::size_t size) {
+            for (std::size_t begin = 0; begin < size; begin += kBlock)
+                blocks_.emplace_back(std::min(kBlock, size - begin));
+            size_ = size;
+        }
+        std::size_t size() const { return size_; }
+        bool empty() const { return size_ == 0; }
+        Entry& operator[](std::size_t i) { return blocks_[i / kBlock][i % kBlock]; }
+        const Entry& operator[](std::size_t i) const { return blocks_[i / kBlock][i % kBlock]; }
+
+        static constexpr std::size_t kBlock = 4096;
+
+    private:
+        std::vector<std::vector<Entry>> blocks_;
+        std::size_t size_ = 0;
+    };
     int column(int axis, double offset) const {
         return static_cast<int>(std::clamp(offset / width_, 0.0, static_cast<double>(count_[axis] - 1)));
     }
@@ -81,7 +107,7 @@ private:
         return static_cast<std::size_t>(column(0, offset.x())) * count_[1] + column(1, offset.y());
     }
 
-    std::vector<Entry> entries_;
+    Entries entries_;
     std::vector<Eigen::Vector3f> directions_;  // those of a lattice: few
     std::vector<std::uint32_t> first_;         // of each column, and the end
     Vec3 origin_, size_;                       // of the box around them
