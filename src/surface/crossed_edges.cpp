@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <bitset>
 #include <numeric>
+#include <utility>
 
 #include "surface/cell_parts.h"
 
@@ -165,7 +166,8 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
     // By blocks: in each they are counted, then written, while their leaves are near at hand.
     constexpr std::size_t kLeaves = 128;  // with fewer a thread knows few of their neighbours
     struct Block {
-        UnsetVector<CrossedEdges::Packed> edges;
+        UnsetVector<float> fractions;
+        UnsetVector<CrossedEdges::Code> codes;
         long cell_parts = 0;
         std::size_t at_border = 0;
     };
@@ -185,13 +187,15 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
             block.cell_parts += cell_parts(leaf, sides, reader);
         }
         if (!signs.are_finite()) return;
-        block.edges.resize(edges);
-        CrossedEdges::Packed* next = block.edges.data();
+        block.fractions.resize(edges);
+        block.codes.resize(edges);
+        std::size_t next = 0;
         for (std::size_t n = begin; n < end; ++n) {
             if (first[n + 1] == 0) continue;
             const Leaf& leaf = leaves.leaf(n);
             for_each_edge_of(leaf, LeafSides(leaf, reader, signs), reader, [&](const CrossedEdge& edge) {
-                *next++ = {edge, leaf.origin()};
+                block.fractions[next] = edge.fraction;
+                block.codes[next++] = {edge, leaf.origin()};
                 block.at_border += edge.at_border;
             });
         }
@@ -204,11 +208,13 @@ CrossedEdges find_crossed_edges(const FloatTree& tree) {
         result.at_border_ += block.at_border;
     }
     std::partial_sum(first.begin(), first.end(), first.begin());
-    result.packed_.resize(first.back());
+    result.fractions_.resize(first.back());
+    result.codes_.resize(first.back());
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
-        std::copy(blocks[b].edges.begin(), blocks[b].edges.end(),
-                  result.packed_.begin() + static_cast<std::ptrdiff_t>(first[b * kLeaves]));
-        blocks[b].edges = UnsetVector<CrossedEdges::Packed>();
+        const Block block = std::move(blocks[b]);
+        const auto begin = static_cast<std::ptrdiff_t>(first[b * kLeaves]);
+        std::copy(block.fractions.begin(), block.fractions.end(), result.fractions_.begin() + begin);
+        std::copy(block.codes.begin(), block.codes.end(), result.codes_.begin() + begin);
     });
     for (std::size_t n = 0; n < count; ++n)
         if (first[n] < first[n + 1])

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "isotrack/types.h"
@@ -30,7 +31,8 @@ struct CrossedEdge {
     }
 };
 
-/// Packed, as there are many, leaf by leaf in the order of the tree. Read-only, so threads may share them.
+/// In six bytes each, as there are many, leaf by leaf in the order of the tree. Read-only, so threads may
+/// share them.
 class CrossedEdges {
 public:
     /// Those found from one leaf.
@@ -39,19 +41,19 @@ public:
         std::size_t begin, end;
     };
 
-    std::size_t size() const { return packed_.size(); }
-    bool empty() const { return packed_.empty(); }
+    std::size_t size() const { return fractions_.size(); }
+    bool empty() const { return fractions_.empty(); }
     /// In a few steps; `for_each_of` takes none.
     CrossedEdge operator[](std::size_t i) const {
         std::size_t part = part_at_[i / kStep];
         while (parts_[part].end <= i) ++part;
-        return packed_[i].unpack(parts_[part].origin);
+        return unpacked(i, parts_[part].origin);
     }
     const std::vector<Part>& parts() const { return parts_; }
     /// Calls `visit(index, edge)` for each of a part.
     template <typename Visit>
     void for_each_of(const Part& part, const Visit& visit) const {
-        for (std::size_t i = part.begin; i < part.end; ++i) visit(i, packed_[i].unpack(part.origin));
+        for (std::size_t i = part.begin; i < part.end; ++i) visit(i, unpacked(i, part.origin));
     }
 
     bool finite() const { return finite_; }               ///< Whether all values of leaves are.
@@ -61,35 +63,51 @@ public:
 private:
     friend CrossedEdges find_crossed_edges(const openvdb::FloatTree& tree);
 
-    /// Its lower end is a node of the leaf or one step below it.
-    struct Packed {
-        float fraction;
-        std::uint32_t x : 4, y : 4, z : 4;  // of the lower end, counted from one step below the leaf
-        std::uint32_t axis : 2, outward : 1, at_border : 1, saddles : 3;
-
-        Packed(const CrossedEdge& edge, const openvdb::Coord& origin)
-            : fraction(edge.fraction),
-              x(static_cast<std::uint32_t>(edge.from.x() - origin.x() + 1)),
-              y(static_cast<std::uint32_t>(edge.from.y() - origin.y() + 1)),
-              z(static_cast<std::uint32_t>(edge.from.z() - origin.z() + 1)),
-              axis(static_cast<std::uint32_t>(edge.axis)),
-              outward(edge.outward),
-              at_border(edge.at_border),
-              saddles(edge.saddles) {}
-        CrossedEdge unpack(const openvdb::Coord& origin) const {
-            const auto in_leaf = [](std::uint32_t stored) { return static_cast<int>(stored) - 1; };
-            return {origin.offsetBy(in_leaf(x), in_leaf(y), in_leaf(z)),
+    /// All but the fraction. The lower end is a node of the leaf, or one step below it along the edge's axis.
+    class Code {
+    public:
+        Code() = default;
+        Code(const CrossedEdge& edge, const openvdb::Coord& origin) {
+            openvdb::Coord in_leaf = edge.from - origin;
+            int axis = edge.axis;
+            if (in_leaf[axis] < 0) {
+                in_leaf[axis] = axis;
+                std::swap(in_leaf[axis], in_leaf[0]);
+                axis = kBelow;
+            }
+            bits_ = static_cast<std::uint16_t>(in_leaf[0] << 13 | in_leaf[1] << 10 | in_leaf[2] << 7 |
+                                               axis << 5 | edge.saddles << 2 | edge.at_border << 1 |
+                                               static_cast<int>(edge.outward));
+        }
+        CrossedEdge edge(const openvdb::Coord& origin, float fraction) const {
+            openvdb::Coord in_leaf(bits_ >> 13, bits_ >> 10 & 7, bits_ >> 7 & 7);
+            int axis = bits_ >> 5 & 3;
+            if (axis == kBelow) {
+                axis = in_leaf[0];
+                in_leaf[0] = -1;
+                std::swap(in_leaf[axis], in_leaf[0]);
+            }
+            return {origin + in_leaf,
                     fraction,
                     static_cast<std::int8_t>(axis),
-                    outward != 0,
-                    at_border != 0,
-                    static_cast<std::uint8_t>(saddles)};
+                    (bits_ & 1) != 0,
+                    (bits_ >> 1 & 1) != 0,
+                    static_cast<std::uint8_t>(bits_ >> 2 & 7)};
         }
+
+    private:
+        static_assert(openvdb::FloatTree::LeafNodeType::LOG2DIM == 3);
+        static constexpr int kBelow = 3;  // for the axis, which is then in the place of the first coordinate
+
+        std::uint16_t bits_;  // from the highest: lower end in the leaf, axis, saddles, at_border, outward
     };
-    static_assert(sizeof(Packed) == 8);
+    CrossedEdge unpacked(std::size_t i, const openvdb::Coord& origin) const {
+        return codes_[i].edge(origin, fractions_[i]);
+    }
     static constexpr std::size_t kStep = 64;
 
-    UnsetVector<Packed> packed_;
+    UnsetVector<float> fractions_;
+    UnsetVector<Code> codes_;
     std::vector<Part> parts_;             // one after the other, none empty
     std::vector<std::uint32_t> part_at_;  // of every kStep-th edge
     bool finite_ = true;

@@ -195,6 +195,7 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     };
     take_changed(came, changes.came);
     take_changed(went, changes.went);
+    facets_ = {};  // of no more use
     changes.many = static_cast<double>(std::max(changes.came.size(), changes.went.size())) >
                    kMany * static_cast<double>(facets.size());
     std::vector<Triangle> fresh;
@@ -221,7 +222,6 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     }
     errors_ = result.errors = measured;  // first: the errors before have no use any more
     expected_.reset();                   // vertices may move from now on
-    facets_ = {};                        // first: there are many
     facets_ = {mesh.carved, mesh.vertices};
     return in_vain;
 }

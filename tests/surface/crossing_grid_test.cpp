@@ -14,7 +14,8 @@
 namespace isotrack {
 namespace {
 
-constexpr double kResolution = 0.05;
+constexpr double kResolution = 0.05, kFineResolution = 0.02;
+constexpr std::size_t kSeveralBlocks = 3 * 4096;  // of memory, and for several threads
 
 /// Point and direction, to be sorted.
 using Row = std::array<double, 6>;
@@ -43,7 +44,7 @@ TEST(CrossingGrid, HoldsTheCrossingsOfASurface) {
 }
 
 TEST(CrossingGrid, IsTheSameAtAnyNumberOfThreads) {
-    const auto torus = shapes::torus({0.1, 0.2, 0.3}, 1.0, 0.4, 0.02);
+    const auto torus = shapes::torus({0.1, 0.2, 0.3}, 1.0, 0.4, kFineResolution);
     const auto rows = [&](std::size_t threads) {
         const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
         const CrossingGrid grid(*torus);
@@ -52,13 +53,14 @@ TEST(CrossingGrid, IsTheSameAtAnyNumberOfThreads) {
         return result;
     };
     const std::vector<Row> one = rows(1);
-    ASSERT_GT(one.size(), 3 * 4096u);  // several threads have some to do
+    ASSERT_GT(one.size(), kSeveralBlocks);
     for (int again = 0; again < 5; ++again) EXPECT_EQ(rows(2), one);
 }
 
 TEST(CrossingGrid, FindsWhatIsInABox) {
-    const auto torus = shapes::torus({0.1, 0.2, 0.3}, 1.0, 0.4, kResolution);
+    const auto torus = shapes::torus({0.1, 0.2, 0.3}, 1.0, 0.4, kFineResolution);
     const CrossingGrid grid(*torus);
+    ASSERT_GT(grid.size(), kSeveralBlocks);
     for (const Vec3& low : {Vec3(-2.0, -2.0, -2.0), Vec3(0.3, 0.1, 0.2), Vec3(1.3, 0.3, -0.1)})
         for (const double size : {0.0, 0.07, 0.5, 9.0}) {
             const Box box(low, low + Vec3(size, 0.7 * size, 1.3 * size));

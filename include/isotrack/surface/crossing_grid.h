@@ -51,21 +51,16 @@ public:
         for (int x = column(0, low.x()); x <= to[0]; ++x)
             for (int y = column(1, low.y()); y <= to[1]; ++y) {
                 const std::size_t at = static_cast<std::size_t>(x) * count_[1] + y;
-                const std::size_t end = first_[at + 1];
-                std::size_t c = first_[at];
-                for (std::size_t left = end - c; left > 0;) {  // to the first that is not below the box
-                    const std::size_t half = left / 2;
-                    const bool below = entries_[c + half].offset.z() < low.z();
-                    if (below) c += half + 1;
-                    left = below ? left - half - 1 : half;
-                }
-                for (; c < end; ++c) {
-                    const Eigen::Vector3f& offset = entries_[c].offset;
-                    if (offset.z() > high.z()) break;
-                    if (offset.x() >= low.x() && offset.x() <= high.x() && offset.y() >= low.y() &&
-                        offset.y() <= high.y())
-                        visit(c);
-                }
+                entries_.for_each_run(
+                    first_[at], first_[at + 1], [&](const Entry* begin, const Entry* end, std::size_t first) {
+                        const Entry* e = std::lower_bound(
+                            begin, end, low.z(),
+                            [](const Entry& entry, double z) { return entry.offset.z() < z; });
+                        for (; e != end && e->offset.z() <= high.z(); ++e)
+                            if (e->offset.x() >= low.x() && e->offset.x() <= high.x() &&
+                                e->offset.y() >= low.y() && e->offset.y() <= high.y())
+                                visit(first + static_cast<std::size_t>(e - begin));
+                    });
             }
     }
 
@@ -93,6 +88,15 @@ private:
         bool empty() const { return size_ == 0; }
         Entry& operator[](std::size_t i) { return blocks_[i / kBlock][i % kBlock]; }
         const Entry& operator[](std::size_t i) const { return blocks_[i / kBlock][i % kBlock]; }
+        /// Calls `visit(begin, end, first)` with those from `first` on that are in one block.
+        template <typename Visit>
+        void for_each_run(std::size_t first, std::size_t end, const Visit& visit) const {
+            for (std::size_t next; first < end; first = next) {
+                next = std::min(end, (first / kBlock + 1) * kBlock);
+                const Entry* begin = &(*this)[first];
+                visit(begin, begin + (next - first), first);
+            }
+        }
 
         static constexpr std::size_t kBlock = 4096;
 
