@@ -46,6 +46,12 @@ void LivingDelaunay::assign(const std::vector<Vec3>& points, const std::vector<c
     rebuild();
 }
 
+void LivingDelaunay::clear() {
+    const UpdateProfile profile = profile_;
+    *this = {};
+    profile_ = profile;
+}
+
 void LivingDelaunay::rebuild() {
     const Clocked clock(profile_.build);
     std::vector<int> numbers;

@@ -15,6 +15,8 @@ public:
     /// Starts anew with vertex i at points[i], where `there` (all when empty) is set; of several points on
     /// one place one has a vertex, or all while there are no cells.
     void assign(const std::vector<Vec3>& points, const std::vector<char>& there = {});
+    /// Without vertices and cells, and frees their memory.
+    void clear();
     /// False when another vertex is on that very place; the number has then no vertex. `near`: the number of
     /// a vertex close by, or -1.
     bool insert(int number, const Vec3& p, int near);

@@ -25,6 +25,12 @@ public:
         dt_.assign(points);
         assigned();
     }
+    void clear() override {
+        points_ = {};
+        there_ = {};
+        dt_.clear();
+        assigned();
+    }
     void compact() override {
         settle();
         std::vector<int> to(points_.size(), -1);
@@ -164,6 +170,7 @@ public:
         return v;
     }
     void move(int vertex, const Vec3& to) override {
+        if (points_[vertex] == to) return;
         points_[vertex] = to;
         moved_ += !pending_[vertex];
         pending_[vertex] = 1;

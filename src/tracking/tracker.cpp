@@ -36,6 +36,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kRounds = 2, kDenseRounds = 3;
 constexpr int kMendingSweeps = 3;
+constexpr double kMostRest = 0.5;  // of the particles
 constexpr double kAstray = 0.125;  // of the particles: so many newborn at the end of the arrays are too many
 constexpr Pace kAtFirst{{}, 0.3, 5}, kDenseAtFirst{{}, 0.3, 7};
 // What the mesh can do without goes sooner; where it is too coarse certify finds better places.
@@ -101,7 +102,7 @@ void Tracker::Impl::arrange() {
     particles.reorder(order);
     last_mesh.grow(particles.size());
     last_mesh.reorder(order);
-    in_dt.clear();
+    forget_dt();
     first_astray = next_id;
 }
 
@@ -143,6 +144,19 @@ void Tracker::Impl::bring_dt(bool moved) {
         dt->compact();
     }
     in_dt = particles.id;
+}
+
+void Tracker::Impl::forget_dt() {
+    dt->clear();
+    labels = {};
+    in_dt = {};
+}
+
+bool Tracker::Impl::most_moved() const {
+    std::size_t rest = 0;
+    for (std::size_t i = 0; i < particles.size(); ++i)
+        rest += particles.id[i] < first_of_frame && particles.velocity[i].isZero(0.0);
+    return static_cast<double>(rest) < kMostRest * static_cast<double>(particles.size());
 }
 
 FrameMesh Tracker::Impl::carve_mesh(const Surface& surface, std::map<std::string, double>& seconds) {
@@ -398,6 +412,8 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
                                                     : last_mesh.triangles);
     }
     frame.relocated += dt->profile().relocated - relocated;
+    const bool is_kept = options.delaunay == UpdateStrategy::Move || options.delaunay == UpdateStrategy::Lazy;
+    if (!is_kept && most_moved()) forget_dt();
     name_vertices(work->mesh, frame.mesh);
     frame.particles = particles.size();
     for (const Id id : particles.id) frame.born += id >= first_of_frame;

@@ -53,6 +53,10 @@ struct Tracker::Impl {
     void tetrahedralise(bool moved, std::map<std::string, double>& seconds,
                         const std::function<void()>& meanwhile = {});
     void bring_dt(bool moved);
+    /// Frees the DT; the next is built anew.
+    void forget_dt();
+    /// Whether so many particles moved or came in this frame that the next DT will be built anew.
+    bool most_moved() const;
 
     /// The mesh of the DT as it is, before any fit.
     FrameMesh carve_mesh(const Surface& surface, std::map<std::string, double>& seconds);

@@ -312,6 +312,36 @@ TEST_P(UpdateStrategies, MayRunOutOfPointsAndStartAgain) {
     EXPECT_EQ(dt->insert(Vec3::Zero(), -1), 10);
 }
 
+TEST_P(UpdateStrategies, StartsAnewOnceCleared) {
+    const auto dt = make_tetrahedralisation(GetParam());
+    dt->assign(random_points(40, 18));
+    dt->move(3, {0.1, 0.2, 0.3});
+    dt->remove(4);
+    const std::size_t built = dt->profile().build.calls, relocated = dt->profile().relocated;
+    dt->clear();
+    EXPECT_EQ(dt->cells().size(), 0u);
+    EXPECT_TRUE(dt->take_changed().empty());
+    EXPECT_EQ(dt->profile().build.calls, built);  // what was done is not forgotten
+    EXPECT_EQ(dt->profile().relocated, relocated);
+    const auto points = random_points(30, 19);
+    dt->assign(points);
+    EXPECT_EQ(cell_sets(dt->cells()), cell_sets(tetrahedralise(points)));
+    EXPECT_EQ(dt->take_changed().size(), dt->cells().size());
+    EXPECT_EQ(dt->insert(Vec3::Zero(), -1), 30);
+}
+
+TEST_P(UpdateStrategies, ChangeNothingWhereVerticesStay) {
+    auto points = random_points(50, 20);
+    const auto dt = make_tetrahedralisation(GetParam());
+    dt->assign(points);
+    dt->take_changed();
+    for (int v = 0; v < 50; ++v) dt->move(v, points[v]);
+    dt->settle();
+    EXPECT_TRUE(dt->take_changed().empty());
+    EXPECT_EQ(dt->profile().build.calls, 1u);
+    EXPECT_EQ(dt->profile().relocated, 0u);
+}
+
 TEST_P(UpdateStrategies, LeavesAVertexOnTheVeryPlaceOfAnotherOut) {
     auto points = random_points(20, 17);
     points.push_back(points[3]);

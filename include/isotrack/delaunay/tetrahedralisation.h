@@ -74,6 +74,8 @@ public:
 
     /// Starts anew with vertex i at points[i].
     virtual void assign(const std::vector<Vec3>& points) = 0;
+    /// Without vertices and cells, and frees their memory. `assign` comes next.
+    virtual void clear() = 0;
     /// Adds a vertex and returns its number: the count of vertices ever added. `near` is a vertex close by,
     /// or -1.
     virtual int insert(const Vec3& point, int near) = 0;
