@@ -15,7 +15,7 @@ namespace isotrack {
 namespace {
 
 constexpr std::size_t kLeafValues = 512;
-constexpr std::size_t kPart = 1 << 19;  // bytes, about, walked at a time
+constexpr std::size_t kPart = 1 << 17;  // bytes, about, walked at a time
 
 template <typename T>
 T number(std::string_view bytes, std::size_t offset = 0) {
