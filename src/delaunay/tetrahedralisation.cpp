@@ -152,7 +152,7 @@ public:
     }
 
 private:
-    void assigned() override { score_.assign(points_.size(), 0); }
+    void assigned() override { score_ = std::vector<int>(points_.size(), 0); }
     std::vector<int> score_;
 };
 
@@ -199,8 +199,8 @@ public:
 
 private:
     void assigned() override {
-        pending_.assign(points_.size(), 0);
-        near_.assign(points_.size(), -1);
+        pending_ = std::vector<char>(points_.size(), 0);
+        near_ = std::vector<int>(points_.size(), -1);
         inserted_ = moved_ = removed_ = 0;
     }
 

@@ -20,9 +20,6 @@ public:
         void* bytes = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
         if (bytes == MAP_FAILED) throw std::bad_alloc();
         bytes_.reset(static_cast<char*>(bytes));
-#ifdef MADV_HUGEPAGE
-        ::madvise(bytes, size, MADV_HUGEPAGE);  // else the system is asked for every 4 kB
-#endif
     }
     char* data() const {
         return bytes_.get();

@@ -68,10 +68,10 @@ void read_vdb_tree(openvdb::GridBase& grid, VdbTreeWalk& walk, const VdbTreeForm
         const openvdb::tree::LeafManager leaves(tree);
         const std::size_t count = leaves.leafCount();
         if (count != walk.leaf_count()) throw std::runtime_error("its tree has other leaves than it says");
-        for (std::size_t n = 0; n < count; ++n) leaves.leaf(n).buffer().allocate();
         const bool half = grid.saveFloatAsHalf();
         std::size_t first = 0;  // of the next buffers
         const auto read_next = [&](const VdbTreeWalk::Buffers& buffers) {
+            for (std::size_t n = 0; n < buffers.begin.size(); ++n) leaves.leaf(first + n).buffer().allocate();
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, buffers.begin.size(), kLeaves),
                               [&](const auto& range) {
                                   TreeStream stream(buffers.bytes, grid, format);

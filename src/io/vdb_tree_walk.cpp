@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::size_t kLeafValues = 512;
 constexpr std::size_t kPart = 1 << 17;  // bytes, about, walked at a time
+constexpr std::size_t kMostRoom = 2 * kPart;
 
 template <typename T>
 T number(std::string_view bytes, std::size_t offset = 0) {
@@ -41,7 +42,10 @@ VdbTreeWalk::VdbTreeWalk(std::uint64_t size, const VdbValueLayout& layout, Read 
       layout_(layout) {}
 
 std::string_view VdbTreeWalk::topology() {
+    constexpr std::size_t kLeastBuffer = kLeafValues / 8 + 1;
     read_root();
+    if (active_.size() > (unread_ + (filled_ - at_)) / kLeastBuffer)
+        throw std::runtime_error("its voxels end too early");
     return here_.view().substr(0, at_);
 }
 
@@ -58,10 +62,17 @@ VdbTreeWalk::Buffers VdbTreeWalk::next_buffers() {
 }
 
 void VdbTreeWalk::give_up_walked() {
-    std::memmove(here_.data(), here_.data() + at_, filled_ - at_);
+    const char* left = here_.data() + at_;
     given_up_ += at_;
     filled_ -= at_;
     at_ = 0;
+    if (here_.size() > kMostRoom && filled_ <= kMostRoom) {  // after the topology, which is there at once
+        SystemMemory less(kMostRoom);
+        std::memcpy(less.data(), left, filled_);
+        here_ = std::move(less);
+    } else {
+        std::memmove(here_.data(), left, filled_);
+    }
 }
 
 /// The next bytes; valid until the next call.
@@ -133,6 +144,7 @@ void VdbTreeWalk::skip_values(std::size_t count, std::size_t active) {
 }
 
 void VdbTreeWalk::skip_block(std::size_t count) {
+    constexpr std::size_t kMostHeader = 256;
     using namespace openvdb::io;
     const std::size_t expected = count * layout_.stored_bytes;
     if (layout_.half && count == 0) return;
@@ -147,6 +159,9 @@ void VdbTreeWalk::skip_block(std::size_t count) {
         take(expected);
         return;
     }
+    // Who packs writes what does not get smaller as it is, or with a header; with ample room for others.
+    if (static_cast<std::uint64_t>(stated) > 2 * expected + kMostHeader)
+        throw std::runtime_error("a block of its voxels has a wrong length");
     const std::string_view block = take(static_cast<std::uint64_t>(stated));
     if ((layout_.compression & COMPRESS_BLOSC) == 0) return;
     // Blosc's header: four bytes of version and flags; then, 32 bits each, lengths unpacked, of a part,

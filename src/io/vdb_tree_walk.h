@@ -22,12 +22,13 @@ struct VdbValueLayout {
 /// Walks a tree (of the usual shape 5, 4, 3; file version 222 or later) from its beginning, without
 /// decompressing it, and checks what OpenVDB 10 does not: it copies a block that says it is stored as it is
 /// into a buffer of the expected size, whatever length the block states, and it trusts the lengths inside a
-/// Blosc block. Part by part, so that there are never all of its bytes at once.
+/// Blosc block. Part by part: but for the topology there are never all of its bytes at once.
 ///
-/// All throw std::runtime_error with what is wrong, and what `read` throws.
+/// All throw std::runtime_error with what is wrong, std::bad_alloc, and what `read` throws.
 class VdbTreeWalk {
 public:
-    /// Writes the next bytes, so many, to a place.
+    /// Writes the next bytes, so many, to a place. It is asked ahead of the walk, also for what is behind the
+    /// tree.
     using Read = std::function<void(char*, std::size_t)>;
 
     /// Of the next `size` bytes that `read` has the tree takes the first.

@@ -3,6 +3,7 @@
 
 #include <openvdb/openvdb.h>
 
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -70,11 +71,13 @@ private:
         Code(const CrossedEdge& edge, const openvdb::Coord& origin) {
             openvdb::Coord in_leaf = edge.from - origin;
             int axis = edge.axis;
+            assert(in_leaf[axis] >= -1);
             if (in_leaf[axis] < 0) {
                 in_leaf[axis] = axis;
                 std::swap(in_leaf[axis], in_leaf[0]);
                 axis = kBelow;
             }
+            assert(((in_leaf[0] | in_leaf[1] | in_leaf[2]) & ~7) == 0);
             bits_ = static_cast<std::uint16_t>(in_leaf[0] << 13 | in_leaf[1] << 10 | in_leaf[2] << 7 |
                                                axis << 5 | edge.saddles << 2 | edge.at_border << 1 |
                                                static_cast<int>(edge.outward));
@@ -101,6 +104,7 @@ private:
 
         std::uint16_t bits_;  // from the highest: lower end in the leaf, axis, saddles, at_border, outward
     };
+    static_assert(sizeof(Code) == 2);
     CrossedEdge unpacked(std::size_t i, const openvdb::Coord& origin) const {
         return codes_[i].edge(origin, fractions_[i]);
     }

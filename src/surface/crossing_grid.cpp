@@ -59,8 +59,7 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     const std::size_t columns = first_.size() - 1;
     // Each goes to the next free place of its column, in any order: they are sorted then. To make them takes
     // longer than anything else here, so they are held twice; a frame needs its most memory later.
-    Entries made;
-    made.resize(crossings.size);
+    Entries made(crossings.size);
     std::vector<std::atomic<std::uint32_t>> next(columns);
     Directions directions;
     const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, Entries::kBlock);
@@ -92,7 +91,7 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     for (const Eigen::Vector3f& direction : directions.all())
         sorted.push_back(static_cast<std::uint32_t>(
             std::find(directions_.begin(), directions_.end(), direction) - directions_.begin()));
-    entries_.resize(crossings.size);
+    entries_ = Entries(crossings.size);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
             const std::size_t column = column_of(made[c].offset);
@@ -133,7 +132,7 @@ CrossingGrid CrossingGrid::some(std::vector<int>& numbers) const {
     tbb::parallel_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
         return std::tie(a.column, a.z, a.number) < std::tie(b.column, b.z, b.number);
     });
-    result.entries_.resize(places.size());
+    result.entries_ = Entries(places.size());
     for (std::size_t i = 0; i < places.size(); ++i) {
         numbers[i] = places[i].number;
         result.entries_[i] = entries_[places[i].number];

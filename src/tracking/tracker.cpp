@@ -36,7 +36,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kRounds = 2, kDenseRounds = 3;
 constexpr int kMendingSweeps = 3;
-constexpr double kMostRest = 0.5;  // of the particles
+constexpr double kRest = 0.875;   // of the particles: where fewer rest, following the others is slower
 constexpr double kAstray = 0.125;  // of the particles: so many newborn at the end of the arrays are too many
 constexpr Pace kAtFirst{{}, 0.3, 5}, kDenseAtFirst{{}, 0.3, 7};
 // What the mesh can do without goes sooner; where it is too coarse certify finds better places.
@@ -81,13 +81,16 @@ Tracker::Impl::Impl(const TrackerOptions& o) : options(o) {
     if (o.max_edge && !(*o.max_edge > 0.0)) throw OptionError("the largest edge must be a positive length");
     if (o.min_edge && o.max_edge && *o.min_edge > *o.max_edge)
         throw OptionError("the smallest edge is longer than the largest");
-    // In the paper's method the descent has a DT of its own; this one is for the mesh.
-    dt = make_tetrahedralisation(o.method == Method::Paper ? UpdateStrategy::Rebuild : o.delaunay);
+    dt = make_tetrahedralisation(mesh_strategy());
 }
 
 UpdateStrategy Tracker::Impl::strategy() const {
     const bool as_in_paper = options.method == Method::Paper && options.delaunay == UpdateStrategy::Auto;
     return as_in_paper ? UpdateStrategy::Lazy : options.delaunay;
+}
+
+UpdateStrategy Tracker::Impl::mesh_strategy() const {
+    return options.method == Method::Paper ? UpdateStrategy::Rebuild : options.delaunay;
 }
 
 std::optional<double> Tracker::Impl::flips_within(const SizingLimits& l) const {
@@ -152,11 +155,12 @@ void Tracker::Impl::forget_dt() {
     in_dt = {};
 }
 
-bool Tracker::Impl::most_moved() const {
+bool Tracker::Impl::will_build_anew() const {
+    if (mesh_strategy() == UpdateStrategy::Move || mesh_strategy() == UpdateStrategy::Lazy) return false;
     std::size_t rest = 0;
     for (std::size_t i = 0; i < particles.size(); ++i)
         rest += particles.id[i] < first_of_frame && particles.velocity[i].isZero(0.0);
-    return static_cast<double>(rest) < kMostRest * static_cast<double>(particles.size());
+    return static_cast<double>(rest) < kRest * static_cast<double>(particles.size());
 }
 
 FrameMesh Tracker::Impl::carve_mesh(const Surface& surface, std::map<std::string, double>& seconds) {
@@ -395,7 +399,8 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     TrackedFrame& frame = work->frame;
     frame.tolerance = effective_tolerance(options, surface);
     frame.delaunay_strategy = name_of(strategy());
-    const std::size_t relocated = dt->profile().relocated, before = particles.size();
+    const std::size_t relocated = dt->profile().relocated, built = dt->profile().build.calls,
+                      before = particles.size();
     first_of_frame = next_id;
 
     place_particles(motion, *work);
@@ -412,8 +417,8 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
                                                     : last_mesh.triangles);
     }
     frame.relocated += dt->profile().relocated - relocated;
-    const bool is_kept = options.delaunay == UpdateStrategy::Move || options.delaunay == UpdateStrategy::Lazy;
-    if (!is_kept && most_moved()) forget_dt();
+    frame.rebuilt = dt->profile().build.calls - built;
+    if (will_build_anew()) forget_dt();
     name_vertices(work->mesh, frame.mesh);
     frame.particles = particles.size();
     for (const Id id : particles.id) frame.born += id >= first_of_frame;

@@ -39,6 +39,8 @@ struct Tracker::Impl {
     explicit Impl(const TrackerOptions& o);
 
     UpdateStrategy strategy() const;
+    /// Of the DT that meshes are carved from: in the paper's method the descent has another.
+    UpdateStrategy mesh_strategy() const;
 
     /// What flips may leave of the tolerance; in the paper's method it has no say.
     std::optional<double> flips_within(const SizingLimits& l) const;
@@ -55,8 +57,8 @@ struct Tracker::Impl {
     void bring_dt(bool moved);
     /// Frees the DT; the next is built anew.
     void forget_dt();
-    /// Whether so many particles moved or came in this frame that the next DT will be built anew.
-    bool most_moved() const;
+    /// Whether so many particles moved or came in this frame that the next DT is likely to be.
+    bool will_build_anew() const;
 
     /// The mesh of the DT as it is, before any fit.
     FrameMesh carve_mesh(const Surface& surface, std::map<std::string, double>& seconds);

@@ -88,6 +88,7 @@ TEST(MovingAndResting, RestsWhereTheSurfaceRests) {
             TrackedFrame frame = tracker.advance(level_set);
             EXPECT_TRUE(frame.within_tolerance);
             if (f >= 6) {
+                EXPECT_EQ(frame.rebuilt, 0u) << f;
                 EXPECT_LE(static_cast<double>(frame.born + frame.died),
                           0.02 * static_cast<double>(frame.particles));
                 std::map<Id, Vec3> was;
@@ -114,6 +115,7 @@ TEST(MovingAndResting, NeedsHardlyMoreTrianglesThanFromTheStartAfterManyFrames) 
         const LevelSet level_set(rasterise(*shapes::moved(solid, place), kVoxel));
         const TrackedFrame frame = tracker.advance(level_set);
         EXPECT_TRUE(frame.within_tolerance) << f;
+        EXPECT_GE(frame.rebuilt, 1u) << f;
         if (f < 12) continue;
         Tracker anew(with_tolerance(0.5 * kVoxel));
         EXPECT_LT(static_cast<double>(frame.mesh.triangles.size()),

@@ -55,7 +55,7 @@ enum class UpdateStrategy {
 };
 const char* name_of(UpdateStrategy strategy);
 
-/// What the upkeep of a DT did since `assign`: the rows of the paper's table 1.
+/// What the upkeep of a DT did since the first `assign`: the rows of the paper's table 1.
 struct UpdateProfile {
     struct Row {
         std::size_t calls = 0;
@@ -74,7 +74,7 @@ public:
 
     /// Starts anew with vertex i at points[i].
     virtual void assign(const std::vector<Vec3>& points) = 0;
-    /// Without vertices and cells, and frees their memory. `assign` comes next.
+    /// Without vertices and cells, and frees their memory; the profile goes on. `assign` comes next.
     virtual void clear() = 0;
     /// Adds a vertex and returns its number: the count of vertices ever added. `near` is a vertex close by,
     /// or -1.

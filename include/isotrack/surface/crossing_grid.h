@@ -79,10 +79,10 @@ private:
     /// Many of them, in blocks, which fit into holes of the heap.
     class Entries {
     public:
-        void resize(std::size_t size) {
+        Entries() = default;
+        explicit Entries(std::size_t size) : size_(size) {
             for (std::size_t begin = 0; begin < size; begin += kBlock)
                 blocks_.emplace_back(std::min(kBlock, size - begin));
-            size_ = size;
         }
         std::size_t size() const { return size_; }
         bool empty() const { return size_ == 0; }

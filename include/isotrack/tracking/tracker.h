@@ -77,6 +77,7 @@ struct TrackedFrame {
     std::size_t born = 0, died = 0, seeded = 0, lost = 0;
     int sweeps = 0;             ///< Relaxation sweeps, over those particles that had to move.
     std::size_t relocated = 0;  ///< Vertices the tetrahedralisation moved one by one.
+    std::size_t rebuilt = 0;    ///< So often that of the mesh was built anew.
     std::string delaunay_strategy;
     double tolerance = 0.0;  ///< The effective one.
     /// The larger of the distances mesh to surface (values over the surface's slope, at up to 28 points of
