@@ -13,8 +13,6 @@ void keep_little_memory() {
     // to the largest that may be kept are. Fixed, else both thresholds go with the blocks that are freed.
     mallopt(M_MMAP_THRESHOLD, 1 << 25);
     mallopt(M_TRIM_THRESHOLD, 1 << 26);
-    // What one thread has freed is of use to the others.
-    mallopt(M_ARENA_MAX, 1);
 #endif
 }
 

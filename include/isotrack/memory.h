@@ -5,8 +5,7 @@ namespace isotrack {
 
 /// Makes the allocator keep freed blocks of up to 32 MB for the next stage, and give larger ones back to the
 /// system, as well as what is free beyond 64 MB: a tenth to a fifth less memory than by its own thresholds,
-/// which go with the blocks that are freed, at the same speed. And lets all threads share what they have
-/// freed, for a tenth less memory and, with two threads, a hundredth more time. It holds for the whole process, so it is for
+/// which go with the blocks that are freed, at the same speed. It holds for the whole process, so it is for
 /// programs to call, at their start; the library never does. Without effect where the C library is not glibc.
 void keep_little_memory();
 

@@ -67,7 +67,7 @@ public:
     void restart();
     /// Before the first mesh is there: triangles that it is likely to have, which must stay until what is
     /// returned was called. That measures them, on any thread; most of the memory is taken here, because
-    /// what a thread gives back may be kept for it alone. Where the mesh has them, with vertices on these very
+    /// what a thread gives back is kept for it alone. Where the mesh has them, with vertices on these very
     /// places, nothing is measured again.
     std::function<void()> expect(const std::vector<Vec3>& particles, const std::vector<Triangle>& triangles);
 
