@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "delaunay/living.h"
+#include "delaunay/update_cost.h"
 #include "room.h"
 
 namespace isotrack {
@@ -12,9 +13,6 @@ namespace {
 
 /// The paper's scores (4.3).
 constexpr int kBroken = 2, kNotDelaunay = 1, kLimit = 4;
-
-/// What one change costs, in units of what building costs per vertex.
-constexpr double kInsertCost = 2.0, kRemoveCost = 6.0;
 
 /// What all strategies share: the true positions, and the DT that follows them.
 class Follower : public Tetrahedralisation {
@@ -188,9 +186,7 @@ public:
 
     void settle() override {
         if (inserted_ + moved_ + removed_ == 0) return;
-        const double cost = kInsertCost * static_cast<double>(inserted_ + moved_) +
-                            kRemoveCost * static_cast<double>(moved_ + removed_);
-        if (always_rebuild_ || cost > static_cast<double>(dt_.size()))
+        if (always_rebuild_ || building_pays(inserted_, moved_, removed_, dt_.size()))
             dt_.assign(points_, there_);
         else
             update();

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "delaunay/spatial_order.h"
+#include "delaunay/update_cost.h"
 #include "isotrack/error.h"
 #include "isotrack/meshing/manifold.h"
 #include "isotrack/meshing/open_border.h"
@@ -36,7 +37,6 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kRounds = 2, kDenseRounds = 3;
 constexpr int kMendingSweeps = 3;
-constexpr double kRest = 0.875;   // of the particles: where fewer rest, following the others is slower
 constexpr double kAstray = 0.125;  // of the particles: so many newborn at the end of the arrays are too many
 constexpr Pace kAtFirst{{}, 0.3, 5}, kDenseAtFirst{{}, 0.3, 7};
 // What the mesh can do without goes sooner; where it is too coarse certify finds better places.
@@ -157,10 +157,10 @@ void Tracker::Impl::forget_dt() {
 
 bool Tracker::Impl::will_build_anew() const {
     if (mesh_strategy() == UpdateStrategy::Move || mesh_strategy() == UpdateStrategy::Lazy) return false;
-    std::size_t rest = 0;
+    std::size_t moved = 0;
     for (std::size_t i = 0; i < particles.size(); ++i)
-        rest += particles.id[i] < first_of_frame && particles.velocity[i].isZero(0.0);
-    return static_cast<double>(rest) < kRest * static_cast<double>(particles.size());
+        moved += particles.id[i] >= first_of_frame || !particles.velocity[i].isZero(0.0);
+    return building_pays(0, moved, 0, particles.size());
 }
 
 FrameMesh Tracker::Impl::carve_mesh(const Surface& surface, std::map<std::string, double>& seconds) {

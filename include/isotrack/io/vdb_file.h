@@ -52,8 +52,8 @@ std::optional<GridInfo> choose_velocity_grid(const std::vector<GridInfo>& grids,
                                              const std::string& path);
 
 /// Reads this one grid of floats, doubles or vec3s and no other, into memory: what happens to the file later
-/// does no harm. Each part of the tree is checked before OpenVDB sees it; grids of other types, which nothing here can
-/// use, are refused. \throws IoError (message clamped to one line of at most 300 characters).
+/// does no harm. Each part of the tree is checked before OpenVDB sees it; grids of other types, which nothing
+/// here can use, are refused. \throws IoError (message clamped to one line of at most 300 characters).
 openvdb::GridBase::Ptr read_grid(const std::string& path, const GridInfo& grid);
 
 }  // namespace isotrack
