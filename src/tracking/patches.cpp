@@ -167,6 +167,27 @@ public:
           resolution_(surface.resolution()),
           lattice_(surface.lattice_mesh(places, lattice_reach * resolution_), resolution_) {}
 
+    /// Whether both mesh and lattice, around a place, face much the same way everywhere, as most do: then
+    /// nothing is joined or parted there. It takes half the time of the numbers, or less.
+    bool is_one_sheet(const Vec3& place, const TriangleBins& mesh) const {
+        constexpr double kSameWay = 0.3;  // cosine
+        const Vec3 extent = Vec3::Constant(kSmall * resolution_);
+        Vec3 mean = Vec3::Zero();  // of the mesh, which has fewer triangles
+        for (const TriangleBins* bins : {&mesh, &lattice_.bins()}) {
+            std::vector<Vec3> ways;
+            for (const int t : bins->meeting(Box(place - extent, place + extent))) {
+                const auto& [i, j, k] = bins->triangles()[t];
+                const Vec3& at = bins->points()[i];
+                ways.push_back((bins->points()[j] - at).cross(bins->points()[k] - at).normalized());
+            }
+            if (bins == &mesh) mean = std::accumulate(ways.begin(), ways.end(), mean).normalized();
+            if (ways.empty() || std::any_of(ways.begin(), ways.end(),
+                                            [&](const Vec3& way) { return !(way.dot(mean) > kSameWay); }))
+                return false;
+        }
+        return true;
+    }
+
     /// Puts those of some places first where mesh and lattice have other numbers around. Returns how many. A
     /// patch seldom changes the numbers at the others, and takes ten times as long to make.
     std::size_t put_differing_first(std::vector<Vec3>& places) {
@@ -176,7 +197,8 @@ public:
         };
         std::vector<char> differ(places.size());
         tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
-            differ[p] = !have_same_numbers(around(places[p], bins), bins, around(places[p], lattice_.bins()),
+            differ[p] = !is_one_sheet(places[p], bins) &&
+                        !have_same_numbers(around(places[p], bins), bins, around(places[p], lattice_.bins()),
                                            lattice_.bins());
         });
         std::vector<Vec3> sorted;
