@@ -16,7 +16,6 @@ struct FrameWork {
     const Surface& surface;
     const SizingLimits limits;
     TrackedFrame frame;
-    bool cold = false;  ///< No particle was there before.
     FrameMesh mesh;
     std::optional<CrossingGrid> crossings;
     std::optional<Inspector> inspector;  ///< Of this mesh.

@@ -44,9 +44,6 @@ bool Tracker::Impl::Making::is_thick() const {
 void Tracker::Impl::Making::mesh_particles() {
     Inspector& inspector = *work_.inspector;
     LastMesh& last_mesh = tracker_.last_mesh;
-    // From frame to frame needles would add up, and at creases particles crowd. On a smooth surface met anew
-    // all have just been spread.
-    const bool has_room = work_.cold && tracker_.is_smooth(work_.limits);
     for (int mending = 0;; ++mending) {
         std::function<void()> measure_expected;
         if (!options().fit && !in_paper())
@@ -64,7 +61,7 @@ void Tracker::Impl::Making::mesh_particles() {
             mending == 0 ? inspector.inspect(work_.mesh) : inspector.inspect_both_ways(work_.mesh);
         densifier_.emplace(tracker_.make_densifier(work_.surface, work_.limits, work_.crossings->size()));
         added_ = mend();
-        if (mending == kMostMendings || has_room ||
+        if (mending == kMostMendings ||
             static_cast<double>(added_) < kFew * static_cast<double>(particles().size()))
             break;
         // What is known of this mesh has no use any more.

@@ -41,12 +41,12 @@ constexpr double kAstray = 0.125;  // of the particles: so many newborn at the e
 constexpr Pace kAtFirst{{}, 0.3, 5}, kDenseAtFirst{{}, 0.3, 7};
 // What the mesh can do without goes sooner; where it is too coarse certify finds better places.
 constexpr Pace kFollowing{{0.7, 1.1}, 0.3, 3};
-constexpr double kThinned = 0.85;       // of the tolerance: error of triangles that close the gap of a death
-constexpr double kUnfitted = 1.3;       // times what a fit leaves of an error
-constexpr int kMostLayers = 4;          // of newborn around those that move
-constexpr double kManyWithError = 0.9;  // of the particles: smooth surfaces have so many
-constexpr double kMostSeeded = 0.05;    // of the particles; with more the next frame is half a cold start
-constexpr double kDetail = 2.0;         // tolerances
+constexpr double kThinned = 0.85;      // of the tolerance: error of triangles that close the gap of a death
+constexpr double kUnfitted = 1.3;      // times what a fit leaves of an error
+constexpr int kMostLayers = 4;         // of newborn around those that move
+constexpr double kFewWithError = 0.9;  // of the particles: smooth surfaces have more
+constexpr double kMostSeeded = 0.05;   // of the particles; with more the next frame is half a cold start
+constexpr double kDetail = 2.0;        // tolerances
 constexpr double kDetailOfEdges = 0.25;
 constexpr double kLeastEdge = 0.5, kLargestEdge = 40.0;  // details
 constexpr double kCrossingsApart = 0.5;  // details: those between are looked at where they may be missed
@@ -195,10 +195,6 @@ FrameMesh Tracker::Impl::mesh_of(CellLabels& of_cells, const Surface& surface) c
     return mesh;
 }
 
-bool Tracker::Impl::is_smooth(const SizingLimits& l) const {
-    return share_with_error(last_mesh.evidence, l) >= kManyWithError;
-}
-
 Densifier Tracker::Impl::make_densifier(const Surface& surface, const SizingLimits& l,
                                         std::size_t crossings) {
     const double finer = std::max(1.0, 0.5 * surface.resolution() / l.tolerance);
@@ -265,7 +261,7 @@ void Tracker::Impl::sample(const Surface& surface, const CrossingGrid& crossings
                            bool warm, TrackedFrame& frame) {
     measure(surface, l, frame);
     // Where flat faces meet nearly all of the mean square is at few particles, and certify adds none for it.
-    const bool dense = options.fit && !warm && !is_smooth(l);
+    const bool dense = options.fit && !warm && share_with_error(last_mesh.evidence, l) < kFewWithError;
     if (dense) {
         seed(surface, crossings, l, kDenseSeeds, frame);
         measure(surface, l, frame);
@@ -375,7 +371,6 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
         work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
         if (warm) frame.seeded = cover(particles, surface, *work.crossings, l, options.seed, next_id, apart);
     }
-    work.cold = !warm;
     if (!warm) seed(surface, *work.crossings, l, apart, frame);
     if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
@@ -399,8 +394,8 @@ void Tracker::Impl::name_vertices(const FrameMesh& mesh, TriangleMesh& named) {
 }
 
 Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motion) {
-    const auto work = std::make_shared<FrameWork>(
-        FrameWork{surface, sizing_limits(options, surface), {}, {}, {}, {}, {}, {}});
+    const auto work =
+        std::make_shared<FrameWork>(FrameWork{surface, sizing_limits(options, surface), {}, {}, {}, {}, {}});
     TrackedFrame& frame = work->frame;
     frame.tolerance = effective_tolerance(options, surface);
     frame.delaunay_strategy = name_of(strategy());

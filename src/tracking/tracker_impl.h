@@ -66,10 +66,6 @@ struct Tracker::Impl {
     /// Carves labels, which change where they are untangled.
     FrameMesh mesh_of(CellLabels& of_cells, const Surface& surface) const;
 
-    /// Whether nearly all particles have an error by the last mesh that was measured: where flat faces meet
-    /// few have.
-    bool is_smooth(const SizingLimits& l) const;
-
     Densifier make_densifier(const Surface& surface, const SizingLimits& l, std::size_t crossings);
 
     /// The newborn move like the neighbours that were there before, or like those of these; farther from all
