@@ -125,10 +125,6 @@ std::vector<Loop> loops_of(const std::vector<std::pair<int, int>>& border) {
     return result;
 }
 
-Vec3 area(const Triangle& t, const std::vector<Vec3>& at) {
-    return (at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]);
-}
-
 /// Triangles between two loops that run the same way round, the first outside the second, with the shortest
 /// edges across among those that face as the `normals` at the second do. Empty where there are too many ways.
 std::vector<Triangle> strip_between(const Loop& outer, const Loop& inner, const std::vector<Vec3>& points,
@@ -152,7 +148,7 @@ std::vector<Triangle> strip_between(const Loop& outer, const Loop& inner, const 
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
         const double longest2 =
             std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-        return area(t, points).dot(normal) > kFlatStrip * longest2 ? 0.0 : kPenalty * longest2;
+        return area_vector(t, points).dot(normal) > kFlatStrip * longest2 ? 0.0 : kPenalty * longest2;
     };
     const auto by_outer = [&](std::size_t i, std::size_t j) { return Triangle{out(i - 1), out(i), in(j)}; };
     const auto by_inner = [&](std::size_t i, std::size_t j) { return Triangle{out(i), in(j), in(j - 1)}; };
@@ -330,7 +326,7 @@ PatchSource::PatchSource(TriangleMesh mesh, double spacing)
       beside_(mesh_.points.size()) {
     forget();
     for (const Triangle& t : mesh_.triangles) {
-        const Vec3 normal = area(t, mesh_.points);
+        const Vec3 normal = area_vector(t, mesh_.points);
         for (const int v : t) normal_[v] += normal;
     }
     for (Vec3& n : normal_) n.normalize();
@@ -356,7 +352,7 @@ void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBi
                 // Another way counts only while none is known that faces the same way.
                 if (to_box >= nearest[1]) return;
                 const Triangle& t = mesh.triangles()[other];
-                const bool same = area(t, points).dot(normal_[v]) > 0.0;
+                const bool same = area_vector(t, points).dot(normal_[v]) > 0.0;
                 if (!same && (at[1] >= 0 || to_box >= nearest[0])) return;
                 const double d = squared_distance(p, points[t[0]], points[t[1]], points[t[2]]);
                 if (d < nearest[same]) nearest[same] = d, at[same] = other;
@@ -370,6 +366,10 @@ void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBi
 
 void PatchSource::forget() {
     for (auto& beside : beside_) beside.store(kNotLookedFor, std::memory_order_relaxed);
+}
+
+Vec3 area_vector(const Triangle& t, const std::vector<Vec3>& at) {
+    return (at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]);
 }
 
 std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh) {

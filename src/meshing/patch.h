@@ -10,6 +10,9 @@
 
 namespace isotrack {
 
+/// Normal to a triangle, of twice the length of its area.
+Vec3 area_vector(const Triangle& t, const std::vector<Vec3>& at);
+
 /// What goes and what comes.
 struct Patch {
     std::vector<int> gone;            ///< Triangles of the mesh, ascending.

@@ -102,10 +102,7 @@ bool crosses(const Patch& patch, const TriangleBins& mesh) {
 
 double area_of(const std::vector<int>& triangles, const FrameMesh& mesh) {
     double twice = 0.0;
-    for (const int t : triangles) {
-        const auto& [i, j, k] = mesh.carved.triangles[t];
-        twice += (mesh.vertices[j] - mesh.vertices[i]).cross(mesh.vertices[k] - mesh.vertices[i]).norm();
-    }
+    for (const int t : triangles) twice += area_vector(mesh.carved.triangles[t], mesh.vertices).norm();
     return 0.5 * twice;
 }
 
@@ -175,11 +172,8 @@ public:
         Vec3 mean = Vec3::Zero();  // of the mesh, which has fewer triangles
         for (const TriangleBins* bins : {&mesh, &lattice_.bins()}) {
             std::vector<Vec3> ways;
-            for (const int t : bins->meeting(Box(place - extent, place + extent))) {
-                const auto& [i, j, k] = bins->triangles()[t];
-                const Vec3& at = bins->points()[i];
-                ways.push_back((bins->points()[j] - at).cross(bins->points()[k] - at).normalized());
-            }
+            for (const int t : bins->meeting(Box(place - extent, place + extent)))
+                ways.push_back(area_vector(bins->triangles()[t], bins->points()).normalized());
             if (bins == &mesh) mean = std::accumulate(ways.begin(), ways.end(), mean).normalized();
             if (ways.empty() || std::any_of(ways.begin(), ways.end(),
                                             [&](const Vec3& way) { return !(way.dot(mean) > kSameWay); }))
