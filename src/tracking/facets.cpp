@@ -20,8 +20,9 @@ Facet MeshFacets::operator[](std::size_t triangle) const {
             {vertices_[i].cast<float>(), vertices_[j].cast<float>(), vertices_[k].cast<float>()}};
 }
 
-KeptFacets::KeptFacets(const CarvedSurface& carved, const std::vector<Vec3>& vertices)
-    : kept_(carved.triangles.size()), place_(vertices.size()) {
+void KeptFacets::assign(const CarvedSurface& carved, const std::vector<Vec3>& vertices) {
+    kept_.resize(carved.triangles.size());
+    place_.resize(vertices.size());
     constexpr std::size_t kGrain = 1024;
     parallel_for_each(kept_.size(), kGrain, [&](std::size_t t) {
         kept_[t] = {facet_key(carved, t), carved.triangles[t]};

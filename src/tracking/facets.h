@@ -41,8 +41,8 @@ private:
 /// The same when the mesh is another, in half of their memory.
 class KeptFacets {
 public:
-    KeptFacets() = default;
-    KeptFacets(const CarvedSurface& carved, const std::vector<Vec3>& vertices);
+    /// From now on those of this mesh, in the memory of those before where it is large enough.
+    void assign(const CarvedSurface& carved, const std::vector<Vec3>& vertices);
     std::size_t size() const { return kept_.size(); }
     Facet operator[](std::size_t triangle) const {
         const auto& [key, corner] = kept_[triangle];

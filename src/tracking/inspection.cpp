@@ -160,9 +160,13 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     const MeshFacets facets(mesh.carved, mesh.vertices);
     std::vector<const FacetError*> known(facets.size(), nullptr);
     std::vector<char> seen(facets.size(), 0);  // in the mesh before
+    // Where no triangle comes or goes, as when a mesh is made blunter, its errors go where those before are:
+    // another thread's heap need not grow for them.
+    bool in_place = errors_.use_count() == 1 && errors_->size() == facets.size();
     const auto take_same = [&](std::size_t f, std::size_t old) {
         known[f] = &(*errors_)[old];
         seen[f] = 1;
+        in_place = in_place && f == old;
     };
     struct Unkeyed {
         std::vector<std::size_t> number;
@@ -195,7 +199,7 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     };
     take_changed(came, changes.came);
     take_changed(went, changes.went);
-    facets_ = {};  // of no more use
+    if (!in_place) facets_ = {};  // of no more use
     changes.many = static_cast<double>(std::max(changes.came.size(), changes.went.size())) >
                    kMany * static_cast<double>(facets.size());
     std::vector<Triangle> fresh;
@@ -205,7 +209,7 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     auto next = errors.begin();
     for (const FacetError*& error : known)
         if (!error) error = &*next++;
-    const auto measured = std::make_shared<std::vector<FacetError>>(facets.size());
+    const auto measured = in_place ? errors_ : std::make_shared<std::vector<FacetError>>(facets.size());
     std::vector<char> too_far(facets.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, facets.size(), 1024), [&](const auto& range) {
         for (std::size_t f = range.begin(); f < range.end(); ++f) {
@@ -220,9 +224,9 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
         const Vec3 where = (*measured)[f].where.cast<double>();
         if (seen[f] || !probe->project(where)) in_vain.push_back(where);
     }
-    errors_ = result.errors = measured;  // first: the errors before have no use any more
+    result.errors = errors_ = measured;  // first: the errors before have no use any more
     expected_.reset();                   // vertices may move from now on
-    facets_ = {mesh.carved, mesh.vertices};
+    facets_.assign(mesh.carved, mesh.vertices);
     return in_vain;
 }
 
