@@ -74,28 +74,28 @@ void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface&
     take(mesh, particles);
 }
 
-bool Fitted::undo_crossing(FrameMesh& mesh, std::size_t particles) {
-    const std::vector<int> vertex = lone_vertices(mesh, particles);
+bool Fitted::undo_crossing(FrameMesh& mesh, const std::vector<Vec3>& particles) {
+    auto crossing = self_intersections(mesh.vertices, mesh.carved.triangles);
+    if (crossing.empty()) return false;
+    const std::vector<Vec3> unfitted = unfitted_vertices(mesh.carved, particles);
+    const std::vector<int> vertex = lone_vertices(mesh, particles.size());
     std::vector<char> undo(mesh.vertices.size(), 0);
-    bool any = false;
-    for (bool changed = true; changed;) {
-        const auto crossing = self_intersections(mesh.vertices, mesh.carved.triangles);
-        if (crossing.empty()) break;
-        any = true;
+    for (bool changed = true; changed && !crossing.empty();) {
         changed = false;
         for (const auto& [t, u] : crossing)
             for (const int of : {t, u})
                 for (const int v : mesh.carved.triangles[of]) {
                     undo[v] = 1;
-                    changed = changed || mesh.vertices[v] != mesh.on_surface[v];
+                    changed = changed || mesh.vertices[v] != unfitted[v];
                 }
         changed = flips_.undo_at(undo, vertex, mesh.carved) || changed;
         for (std::size_t v = 0; v < undo.size(); ++v)
-            if (undo[v]) mesh.vertices[v] = mesh.on_surface[v];
+            if (undo[v]) mesh.vertices[v] = unfitted[v];
         add_ring(undo, mesh.carved.triangles);
+        crossing = self_intersections(mesh.vertices, mesh.carved.triangles);
     }
-    if (any) take(mesh, particles);
-    return any;
+    take(mesh, particles.size());
+    return true;
 }
 
 }  // namespace isotrack

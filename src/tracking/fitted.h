@@ -24,8 +24,8 @@ public:
                       std::optional<double> tolerance);
 
     /// Puts vertices and edges back where triangles cross others, a ring further each time, until none cross.
-    /// Facets of a DT do not. Returns whether any did.
-    bool undo_crossing(FrameMesh& mesh, std::size_t particles);
+    /// Facets of a DT do not. Returns whether any did. `particles`: where they are.
+    bool undo_crossing(FrameMesh& mesh, const std::vector<Vec3>& particles);
 
 private:
     void take(const FrameMesh& mesh, std::size_t particles);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "sampling/compact.h"
+#include "surface/float_precision.h"
 
 namespace isotrack {
 
@@ -33,6 +34,15 @@ bool is_flipped(const CarvedSurface& carved, std::size_t triangle, const Tetrahe
     });
 }
 
+std::vector<Vec3> unfitted_vertices(const CarvedSurface& carved, const std::vector<Vec3>& particles) {
+    std::vector<Vec3> result;
+    result.reserve(carved.particle.size());
+    auto midpoint = carved.midpoints.begin();
+    for (const int p : carved.particle)
+        result.push_back(p >= 0 ? particles[p] : to_float_precision(*midpoint++));
+    return result;
+}
+
 FrameMesh without(FrameMesh mesh, const std::vector<char>& left_out) {
     CarvedSurface& carved = mesh.carved;
     std::vector<char> keep;
@@ -43,12 +53,12 @@ FrameMesh without(FrameMesh mesh, const std::vector<char>& left_out) {
     keep.assign(mesh.vertices.size(), 0);
     for (const Triangle& t : carved.triangles)
         for (const int v : t) keep[v] = 1;
+    std::vector<char> keep_midpoint;
+    for (std::size_t v = 0; v < keep.size(); ++v)
+        if (carved.particle[v] < 0) keep_midpoint.push_back(keep[v]);
     compact(mesh.vertices, keep);
-    compact(mesh.on_surface, keep);
     compact(carved.particle, keep);
-    carved.midpoints.clear();
-    for (std::size_t v = 0; v < carved.particle.size(); ++v)
-        if (carved.particle[v] < 0) carved.midpoints.push_back(mesh.on_surface[v]);
+    compact(carved.midpoints, keep_midpoint);
     const std::vector<int> number = numbers_after(keep);
     for (Triangle& t : carved.triangles)
         for (int& v : t) v = number[v];
@@ -57,7 +67,7 @@ FrameMesh without(FrameMesh mesh, const std::vector<char>& left_out) {
 
 void append(FrameMesh& mesh, const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
     CarvedSurface& carved = mesh.carved;
-    for (auto* to : {&mesh.vertices, &mesh.on_surface, &carved.midpoints})
+    for (auto* to : {&mesh.vertices, &carved.midpoints})
         to->insert(to->end(), points.begin(), points.end());
     carved.triangles.insert(carved.triangles.end(), triangles.begin(), triangles.end());
     carved.particle.resize(mesh.vertices.size(), -1);

@@ -10,9 +10,12 @@ namespace isotrack {
 
 struct FrameMesh {
     CarvedSurface carved;
-    std::vector<Vec3> vertices;    ///< Of the mesh: fitted when asked for.
-    std::vector<Vec3> on_surface;  ///< The same vertices before the fit.
+    std::vector<Vec3> vertices;  ///< Of the mesh: fitted when asked for.
 };
+
+/// Where its vertices are before a fit: on particles, which are in these places, or on midpoints, as floats
+/// hold them.
+std::vector<Vec3> unfitted_vertices(const CarvedSurface& carved, const std::vector<Vec3>& particles);
 
 /// The Euler number of a closed mesh: three halves of an edge for each triangle.
 inline long euler_of(const FrameMesh& mesh) {

@@ -108,7 +108,7 @@ void Tracker::Impl::Making::mend_components() {
             Fitted its_own = fitted_;
             its_own.fit_vertices(other, particles().size(), work_.surface,
                                  tracker_.flips_within(work_.limits));
-            its_own.undo_crossing(other, particles().size());
+            its_own.undo_crossing(other, particles().position);
             return other;
         };
         MeshTrials trials(mesh, inspection, *work_.inspector, work_.limits);
@@ -134,7 +134,7 @@ void Tracker::Impl::Making::certify() {
         const auto passes_or_last = [&] { return last || passes(); };
         inspect_both_ways();
         if (!passes_or_last()) continue;
-        if (options().fit && fitted_.undo_crossing(mesh, particles().size())) {
+        if (options().fit && fitted_.undo_crossing(mesh, particles().position)) {
             inspect_both_ways();
             if (!passes_or_last()) continue;
         }

@@ -186,12 +186,7 @@ FrameMesh Tracker::Impl::mesh_of(CellLabels& of_cells, const Surface& surface) c
     if (options.reconstruction == Reconstruction::Guided &&
         untangle(of_cells, cells, particles.position, surface, mesh.carved, detail_of(options, surface)))
         mesh.carved = carve(cells, of_cells, particles.position);
-    mesh.vertices.reserve(mesh.carved.particle.size());
-    std::size_t midpoint = 0;
-    for (const int p : mesh.carved.particle)
-        mesh.vertices.push_back(p >= 0 ? particles.position[p]
-                                       : to_float_precision(mesh.carved.midpoints[midpoint++]));
-    mesh.on_surface = mesh.vertices;
+    mesh.vertices = unfitted_vertices(mesh.carved, particles.position);
     return mesh;
 }
 

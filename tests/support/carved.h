@@ -33,7 +33,6 @@ struct Carved : Samples {
         std::size_t midpoint = 0;
         for (const int p : result.carved.particle)
             result.vertices.push_back(p >= 0 ? particles.position[p] : result.carved.midpoints[midpoint++]);
-        result.on_surface = result.vertices;
         return result;
     }
     Carve carve_labels() {

@@ -62,7 +62,8 @@ void expect_patched(const openvdb::FloatGrid::Ptr& grid, const Vec3& place, doub
     EXPECT_EQ(topology.euler, *euler);
     EXPECT_EQ(topology.components, components->size());
     expect_sound(mesh);
-    EXPECT_EQ(mesh.on_surface.size(), mesh.vertices.size());
+    EXPECT_EQ(std::count(mesh.carved.particle.begin(), mesh.carved.particle.end(), -1),
+              static_cast<std::ptrdiff_t>(mesh.carved.midpoints.size()));
     EXPECT_EQ(mesh.carved.particle.size(), mesh.vertices.size());
     EXPECT_EQ(mesh.carved.inside_cell.size(), mesh.carved.triangles.size());
     // Now there is nothing to patch.

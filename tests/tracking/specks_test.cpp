@@ -106,7 +106,8 @@ TEST(LostDrops, ArePutInWhereTheMeshHasNothingOfThem) {
     EXPECT_TRUE(then.closed() && then.oriented() && then.manifold());
     EXPECT_TRUE(self_intersections(mesh.vertices, mesh.carved.triangles).empty());
     EXPECT_EQ(now.inspection.errors->size(), mesh.carved.triangles.size());
-    EXPECT_EQ(mesh.on_surface.size(), mesh.vertices.size());
+    EXPECT_EQ(std::count(mesh.carved.particle.begin(), mesh.carved.particle.end(), -1),
+              static_cast<std::ptrdiff_t>(mesh.carved.midpoints.size()));
     EXPECT_EQ(mesh.carved.particle.size(), mesh.vertices.size());
     for (std::size_t v = vertices; v < mesh.vertices.size(); ++v) {
         EXPECT_EQ(mesh.carved.particle[v], -1);
@@ -134,7 +135,7 @@ TEST(LostDrops, AreLeftOutWhereTheyWouldCrossTheMesh) {
     const std::size_t before = mesh.carved.triangles.size();
     EXPECT_FALSE(put_in_drops({{node}}, mesh, now.inspection, now.inspector, surface));
     EXPECT_EQ(mesh.carved.triangles.size(), before);
-    EXPECT_EQ(mesh.vertices.size(), mesh.on_surface.size());
+    EXPECT_EQ(mesh.vertices.size(), mesh.carved.particle.size());
 }
 
 }  // namespace
