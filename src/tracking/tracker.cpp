@@ -403,6 +403,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         Making making(*this, *work);
         making.mesh_particles();
         making.certify();
+        if (will_build_anew()) forget_dt();  // first: much memory, which nothing else needs
         making.patch();
         if (options.method != Method::Paper &&
             making.is_of_particles())  // the next births and deaths go by what is left of errors
@@ -413,7 +414,6 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
     }
     frame.relocated += dt->profile().relocated - relocated;
     frame.rebuilt = dt->profile().build.calls - built;
-    if (will_build_anew()) forget_dt();
     name_vertices(work->mesh, frame.mesh);
     frame.particles = particles.size();
     for (const Id id : particles.id) frame.born += id >= first_of_frame;
