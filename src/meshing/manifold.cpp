@@ -13,30 +13,29 @@
 namespace isotrack {
 namespace {
 
-/// The boundary facets of the inside cells, ascending, and which one follows which around an edge.
+/// The boundary facets of the inside cells, as links, ascending.
+std::vector<int> boundary_facets(const Tetrahedra& cells, const CellLabels& labels) {
+    constexpr std::size_t kBlock = 8192;
+    return find_in_blocks<int>(cells.size(), kBlock,
+                               [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
+                                   for (int c = static_cast<int>(begin); c < static_cast<int>(end); ++c) {
+                                       if (!labels[c]) continue;
+                                       for (int k = 0; k < 4; ++k)
+                                           if (!labels[cells.neighbour(c, k)])
+                                               found.push_back(Tetrahedra::link(c, k));
+                                   }
+                               });
+}
+
+/// These by number, and which one follows which around an edge.
 class Boundary {
 public:
-    Boundary(const Tetrahedra& cells, const CellLabels& labels) : cells_(cells), labels_(labels) {
-        constexpr std::size_t kBlock = 8192;
-        facets_ = find_in_blocks<Facet>(cells.size(), kBlock,
-                                        [&](std::size_t begin, std::size_t end, std::vector<Facet>& found) {
-                                            for (std::size_t c = begin; c < end; ++c) {
-                                                if (!labels[c]) continue;
-                                                for (int k = 0; k < 4; ++k)
-                                                    if (!labels[cells.neighbour(c, k)])
-                                                        found.push_back({static_cast<int>(c), k});
-                                            }
-                                        });
-    }
-    struct Facet {
-        int cell, k;
-        bool operator<(const Facet& o) const { return std::tie(cell, k) < std::tie(o.cell, o.k); }
-    };
-    const std::vector<Facet>& facets() const { return facets_; }
+    Boundary(const Tetrahedra& cells, const CellLabels& labels, const std::vector<int>& facets)
+        : cells_(cells), labels_(labels), facets_(facets) {}
+    int cell(std::size_t facet) const { return facets_[facet] >> 2; }
     Triangle particles(std::size_t facet) const {
-        const auto& [cell, k] = facets_[facet];
-        const auto& v = cells_.vertices[cell];
-        const auto& f = Tetrahedra::kFacet[k];
+        const auto& v = cells_.vertices[cell(facet)];
+        const auto& f = Tetrahedra::kFacet[facets_[facet] & 3];
         return {v[f[0]], v[f[1]], v[f[2]]};
     }
 
@@ -45,10 +44,9 @@ public:
     };
     /// The facet on the other side of the edge opposite `corner`, by rotation through inside cells.
     Side mate(int facet, int corner) const {
-        int cell = facets_[facet].cell;
-        int cross =
-            Tetrahedra::kFacet[facets_[facet].k][corner];  // the facet to cross next is opposite this vertex
-        int other = facets_[facet].k;                      // the remaining vertex off the edge
+        int cell = facets_[facet] >> 2;
+        int other = facets_[facet] & 3;                 // the remaining vertex off the edge
+        int cross = Tetrahedra::kFacet[other][corner];  // the facet to cross next is opposite this vertex
         while (labels_[cells_.neighbour(cell, cross)]) {
             const int next = cells_.neighbour(cell, cross);
             const int pivot = cells_.vertices[cell][other];
@@ -57,7 +55,7 @@ public:
             cross = cells_.index_of(next, pivot);
             other = entry;
         }
-        const auto at = std::lower_bound(facets_.begin(), facets_.end(), Facet{cell, cross});
+        const auto at = std::lower_bound(facets_.begin(), facets_.end(), Tetrahedra::link(cell, cross));
         const auto& f = Tetrahedra::kFacet[cross];
         return {static_cast<int>(at - facets_.begin()), f[0] == other ? 0 : f[1] == other ? 1 : 2};
     }
@@ -65,7 +63,7 @@ public:
 private:
     const Tetrahedra& cells_;
     const CellLabels& labels_;
-    std::vector<Facet> facets_;
+    const std::vector<int>& facets_;
 };
 
 struct HalfEdge {
@@ -110,30 +108,23 @@ bool is_fan(int v, const Corners& corners, const std::vector<Triangle>& triangle
 }  // namespace
 
 CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std::vector<Vec3>& points) {
-    const Boundary boundary(cells, labels);
-    const auto& facets = boundary.facets();
-    const std::size_t count = facets.size();
     CarvedSurface result;
+    result.facet = boundary_facets(cells, labels);
+    const Boundary boundary(cells, labels, result.facet);
+    const std::size_t count = result.facet.size();
     const auto for_each_facet = [&](const auto& body) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1024), [&](const auto& range) {
             for (std::size_t f = range.begin(); f < range.end(); ++f) body(f);
         });
     };
     result.triangles.resize(count);
-    result.inside_cell.resize(count);
-    result.inside_facet.resize(count);
-    for_each_facet([&](std::size_t f) {
-        result.triangles[f] = boundary.particles(f);
-        result.inside_cell[f] = facets[f].cell;
-        result.inside_facet[f] = facets[f].k;
-    });
-    const std::vector<Triangle> in_particles = result.triangles;
-    const Corners corners(points.size(), in_particles);
+    for_each_facet([&](std::size_t f) { result.triangles[f] = boundary.particles(f); });
+    const Corners corners(points.size(), result.triangles);
     std::vector<char> tangled(points.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 512), [&](const auto& range) {
         for (std::size_t p = range.begin(); p < range.end(); ++p)
             tangled[p] = corners.first[p] < corners.first[p + 1] &&
-                         !is_fan(static_cast<int>(p), corners, in_particles);
+                         !is_fan(static_cast<int>(p), corners, result.triangles);
     });
 
     // Around a particle whose triangles are no single fan, going from mate to mate around a corner comes back
@@ -144,6 +135,7 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
         std::vector<int> cycle;
     };
     std::vector<Copy> copies;
+    result.particle.reserve(points.size());
     for (std::size_t p = 0; p < points.size(); ++p) {
         if (corners.first[p] < corners.first[p + 1]) result.particle.push_back(static_cast<int>(p));
         if (!tangled[p]) continue;
@@ -178,7 +170,7 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
         for (const int c : copy.cycle)
             result.triangles[c / 3][c % 3] = static_cast<int>(result.particle.size());
         result.particle.push_back(copy.particle);
-        result.pinched.push_back({copy.particle, facets[copy.corner / 3].cell});
+        result.pinched.push_back({copy.particle, boundary.cell(copy.corner / 3)});
     }
     std::stable_sort(result.pinched.begin(), result.pinched.end(),
                      [](const auto& a, const auto& b) { return a.particle < b.particle; });
@@ -191,7 +183,8 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
     for (std::size_t p = 0; p < points.size(); ++p) {
         if (!tangled[p]) continue;
         for (int c = corners.first[p]; c < corners.first[p + 1]; ++c) {
-            const int t = corners.corner[c] / 3, k = corners.corner[c] % 3, to = in_particles[t][(k + 1) % 3];
+            const int t = corners.corner[c] / 3, k = corners.corner[c] % 3,
+                      to = boundary.particles(t)[(k + 1) % 3];
             if (tangled[to]) raw_edges.push_back({static_cast<int>(p), to, t, (k + 2) % 3});
         }
     }
@@ -201,7 +194,7 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
         const bool repeated = a.from == b.from && a.to == b.to;
         const bool counted = e >= 2 && raw_edges[e - 2].from == b.from && raw_edges[e - 2].to == b.to;
         if (!repeated || counted || a.from > a.to) continue;
-        result.complex_edges.push_back({a.from, a.to, facets[a.triangle].cell});
+        result.complex_edges.push_back({a.from, a.to, boundary.cell(a.triangle)});
     }
 
     // Different edges between the same two output vertices: they get midpoints. Mates keep the pairs apart.
@@ -254,8 +247,8 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
             result.triangles[f] = {polygon[0], polygon[1], polygon[2]};
             for (std::size_t k = 3; k < polygon.size(); ++k) {
                 result.triangles.push_back({polygon[0], polygon[k - 1], polygon[k]});
-                result.inside_cell.push_back(facets[f].cell);
-                result.inside_facet.push_back(facets[f].k);
+                const int facet = result.facet[f];
+                result.facet.push_back(facet);
             }
         }
     }

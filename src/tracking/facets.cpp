@@ -9,9 +9,9 @@ namespace isotrack {
 
 int facet_key(const CarvedSurface& carved, std::size_t triangle) {
     const auto& [i, j, k] = carved.triangles[triangle];
-    const bool whole = carved.inside_cell[triangle] >= 0 && carved.particle[i] >= 0 &&
-                       carved.particle[j] >= 0 && carved.particle[k] >= 0;
-    return whole ? 4 * carved.inside_cell[triangle] + carved.inside_facet[triangle] : -1;
+    const bool whole = carved.facet[triangle] >= 0 && carved.particle[i] >= 0 && carved.particle[j] >= 0 &&
+                       carved.particle[k] >= 0;
+    return whole ? carved.facet[triangle] : -1;
 }
 
 Facet MeshFacets::operator[](std::size_t triangle) const {

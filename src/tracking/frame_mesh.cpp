@@ -24,9 +24,9 @@ std::vector<char> lone_flags(const FrameMesh& mesh, const std::vector<int>& lone
 }
 
 bool is_flipped(const CarvedSurface& carved, std::size_t triangle, const Tetrahedra& cells) {
-    const int cell = carved.inside_cell[triangle];
-    if (cell == CarvedSurface::kNoCell) return false;
-    const auto& facet = Tetrahedra::kFacet[carved.inside_facet[triangle]];
+    const int cell = carved.inside_cell(triangle);
+    if (cell < 0) return false;
+    const auto& facet = Tetrahedra::kFacet[carved.inside_facet(triangle)];
     const Triangle& t = carved.triangles[triangle];
     return std::any_of(t.begin(), t.end(), [&](int v) {
         const int p = carved.particle[v];  // negative at a midpoint, which splits a facet
@@ -48,8 +48,7 @@ FrameMesh without(FrameMesh mesh, const std::vector<char>& left_out) {
     std::vector<char> keep;
     for (const char flag : left_out) keep.push_back(!flag);
     compact(carved.triangles, keep);
-    compact(carved.inside_cell, keep);
-    compact(carved.inside_facet, keep);
+    compact(carved.facet, keep);
     keep.assign(mesh.vertices.size(), 0);
     for (const Triangle& t : carved.triangles)
         for (const int v : t) keep[v] = 1;
@@ -67,12 +66,10 @@ FrameMesh without(FrameMesh mesh, const std::vector<char>& left_out) {
 
 void append(FrameMesh& mesh, const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
     CarvedSurface& carved = mesh.carved;
-    for (auto* to : {&mesh.vertices, &carved.midpoints})
-        to->insert(to->end(), points.begin(), points.end());
+    for (auto* to : {&mesh.vertices, &carved.midpoints}) to->insert(to->end(), points.begin(), points.end());
     carved.triangles.insert(carved.triangles.end(), triangles.begin(), triangles.end());
     carved.particle.resize(mesh.vertices.size(), -1);
-    carved.inside_cell.resize(carved.triangles.size(), CarvedSurface::kNoCell);
-    carved.inside_facet.resize(carved.triangles.size(), 0);
+    carved.facet.resize(carved.triangles.size(), CarvedSurface::kNoFacet);
 }
 
 }  // namespace isotrack

@@ -414,12 +414,12 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             continue;
         }
         const auto [corner, whole] = corners_of(carved, t);
-        const auto x = whole ? dual_crossing(cells, particles.position, carved.inside_cell[t],
-                                             carved.inside_facet[t], *probe)
+        const auto x = whole ? dual_crossing(cells, particles.position, carved.inside_cell(t),
+                                             carved.inside_facet(t), *probe)
                              : std::nullopt;
         if (x) {  // in the middle of the facet's ball, whose corners a flip may have exchanged
             const int on_ball =
-                cells.vertices[carved.inside_cell[t]][Tetrahedra::kFacet[carved.inside_facet[t]][0]];
+                cells.vertices[carved.inside_cell(t)][Tetrahedra::kFacet[carved.inside_facet(t)][0]];
             result.push_back({*x, (*x - particles.position[on_ball]).norm()});
         } else if (is_too_far((*inspection.errors)[t], limits.tolerance) || is_flipped(carved, t, cells)) {
             double h = limits.max_edge;

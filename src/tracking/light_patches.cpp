@@ -32,7 +32,7 @@ std::size_t lighten_patches(MeshTrials& trials, const Surface& surface, const Si
             lighten(mesh.vertices, carved.triangles, may_go, surface, trials.inspector().reached(),
                     kChangedShare * limits.tolerance, limits.detail);
         for (std::size_t t = 0; t < carved.triangles.size(); ++t)
-            if (lightened.changed[t]) carved.inside_cell[t] = CarvedSurface::kNoCell;
+            if (lightened.changed[t]) carved.facet[t] = CarvedSurface::kNoFacet;
         mesh = without(std::move(mesh), lightened.gone);
         const std::size_t went = may_go.size() - mesh.vertices.size();
         if (went == 0) return 0;

@@ -23,12 +23,10 @@ std::size_t relabel(CellLabels& labels, const Tetrahedra& cells, const FrameMesh
     std::size_t changed = 0;
     for (std::size_t t = 0; t < inspection.errors->size(); ++t) {
         const FacetError& error = (*inspection.errors)[t];
-        const int inner = mesh.carved.inside_cell[t];
-        if (!is_too_far(error, limits.tolerance) || inner == CarvedSurface::kNoCell ||
-            is_flipped(mesh.carved, t, cells))
-            continue;
+        const int inner = mesh.carved.inside_cell(t);
+        if (!is_too_far(error, limits.tolerance) || inner < 0 || is_flipped(mesh.carved, t, cells)) continue;
         const bool outside = probe->value(error.where.cast<double>()) > 0.0;
-        const int wrong = outside ? inner : cells.neighbour(inner, mesh.carved.inside_facet[t]);
+        const int wrong = outside ? inner : cells.neighbour(inner, mesh.carved.inside_facet(t));
         if (cells.is_infinite(wrong) || labels[wrong] != static_cast<char>(outside)) continue;
         const double value = probe->value(centroid_of(wrong, cells, particles));
         if ((outside ? value : -value) < -kUnclear * limits.tolerance) continue;

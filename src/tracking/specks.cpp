@@ -175,8 +175,8 @@ std::size_t join_specks(MeshTrials& trials, CellLabels& labels, const Carve& car
         more = false;
         for (const std::vector<char>& speck : each_speck(trials.mesh(), needed())) {
             const auto t = std::find(speck.begin(), speck.end(), 1) - speck.begin();
-            const int inside = trials.mesh().carved.inside_cell[t];
-            if (inside == CarvedSurface::kNoCell || refused.count(inside) > 0) continue;
+            const int inside = trials.mesh().carved.inside_cell(t);
+            if (inside < 0 || refused.count(inside) > 0) continue;
             const std::set<int> part = inside_with(inside, labels, cells);
             if (part.size() < kMostCells && join(part)) {
                 more = ++joined < kMostSpecks;  // the triangles are others now

@@ -137,11 +137,10 @@ TEST(Carve, SaysWhichCellIsBehindEachTriangle) {
     const Samples s(*surface, 0.12);
     const auto labels = guided_convection(s.cells, s.particles.position, s.particles.normal, *surface);
     const auto carved = carve(s.cells, labels, s.particles.position);
-    ASSERT_EQ(carved.inside_cell.size(), carved.triangles.size());
-    ASSERT_EQ(carved.inside_facet.size(), carved.triangles.size());
+    ASSERT_EQ(carved.facet.size(), carved.triangles.size());
     ASSERT_TRUE(carved.midpoints.empty());
     for (std::size_t t = 0; t < carved.triangles.size(); ++t) {
-        const int c = carved.inside_cell[t], k = carved.inside_facet[t];
+        const int c = carved.inside_cell(t), k = carved.inside_facet(t);
         EXPECT_EQ(labels[c], 1);
         EXPECT_EQ(labels[s.cells.neighbour(c, k)], 0);
         std::set<int> facet, expected;

@@ -82,7 +82,7 @@ TEST_P(FitOfABox, MovesVerticesAndFlipsEdges) {
         sharpest_cotangent(first.vertices, first.carved.triangles),
         std::max(std::sqrt(3.0), sharpest_cotangent(unfitted.vertices, unfitted.carved.triangles)) + 1e-5);
     EXPECT_EQ(unfitted_vertices(first.carved, carved.particles.position), unfitted.vertices);
-    EXPECT_EQ(first.carved.inside_cell, unfitted.carved.inside_cell);
+    EXPECT_EQ(first.carved.facet, unfitted.carved.facet);
 }
 
 TEST_P(FitOfABox, FlipsNothingWithoutATolerance) {

@@ -65,7 +65,7 @@ void expect_patched(const openvdb::FloatGrid::Ptr& grid, const Vec3& place, doub
     EXPECT_EQ(std::count(mesh.carved.particle.begin(), mesh.carved.particle.end(), -1),
               static_cast<std::ptrdiff_t>(mesh.carved.midpoints.size()));
     EXPECT_EQ(mesh.carved.particle.size(), mesh.vertices.size());
-    EXPECT_EQ(mesh.carved.inside_cell.size(), mesh.carved.triangles.size());
+    EXPECT_EQ(mesh.carved.facet.size(), mesh.carved.triangles.size());
     // Now there is nothing to patch.
     EXPECT_EQ(patch_topology(now.trials, thickness, surface), 0u);
 

@@ -16,11 +16,15 @@ struct CarvedSurface {
     std::vector<int> particle;
     std::vector<Vec3>
         midpoints;  ///< Positions of the output vertices that stand on no particle: the last ones, in order.
-    static constexpr int kNoCell = -1;
-    /// Per triangle: the cell behind it; midpoints split a triangle, both halves keep its cell, and one that
-    /// is flipped keeps that of the facet in whose place it is. kNoCell: it came later.
-    std::vector<int> inside_cell;
-    std::vector<int> inside_facet;  ///< Per triangle: the index of that cell's vertex opposite the facet.
+    static constexpr int kNoFacet = -1;
+    /// Per triangle: which facet of the cell behind it it is, as `Tetrahedra::link`. Midpoints split a
+    /// triangle, both halves keep its facet, and one that is flipped keeps the facet in whose place it is.
+    /// kNoFacet: it came later.
+    std::vector<int> facet;
+    /// That cell; negative if it came later.
+    int inside_cell(std::size_t triangle) const { return facet[triangle] >> 2; }
+    /// The index of that cell's vertex opposite the facet.
+    int inside_facet(std::size_t triangle) const { return facet[triangle] & 3; }
 
     struct Edge {
         int from, to;  ///< Particles.
