@@ -5,6 +5,7 @@
 #include <array>
 #include <numeric>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "isotrack/surface/level_set.h"
@@ -153,6 +154,41 @@ TEST(Inspector, KnowsWhatChangedSinceItLookedBetweenCrossings) {
         EXPECT_EQ(found_by(kept), found_by(anew)) << v;
     }
     EXPECT_GT(found_by(kept).size(), at_first + 20);
+}
+
+TEST(Inspector, HasTheErrorsOfEachMesh) {
+    const auto box = shapes::box({0.01, 0.02, 0.03}, {1.0, 0.7, 0.45}, kResolution);
+    const CrossingGrid crossings(*box);
+    Carved carved(*box, 0.04);
+    carved.limits.tolerance = 0.06;
+    FrameMesh mesh = carved.mesh();
+    for (Vec3& p : mesh.vertices) p = to_float_precision(p);
+    Inspector kept(*box, carved.limits, crossings);
+    const auto values = [](const Inspection& inspection) {
+        std::vector<std::array<float, 6>> result;
+        for (const FacetError& e : *inspection.errors)
+            result.push_back({e.largest, e.mean_square, e.turned_deg, e.where.x(), e.where.y(), e.where.z()});
+        return result;
+    };
+    const auto measured_anew = [&] {
+        return values(Inspector(*box, carved.limits, crossings).inspect_both_ways(mesh));
+    };
+    Inspection held = kept.inspect_both_ways(mesh);  // as trials of other meshes do
+    const auto at_first = values(held);
+    EXPECT_EQ(at_first, measured_anew());
+    const auto dent_at = [&](std::size_t v) {
+        mesh.vertices[v] = to_float_precision(mesh.vertices[v] * (1.0 - 0.05 / mesh.vertices[v].norm()));
+    };
+    for (std::size_t v = 3; v < mesh.vertices.size(); v += 11) dent_at(v);
+    EXPECT_EQ(values(kept.inspect_both_ways(mesh)), measured_anew());
+    EXPECT_EQ(values(held), at_first);
+    held = {};
+    for (std::size_t v = 7; v < mesh.vertices.size(); v += 11) dent_at(v);  // and nobody holds those before
+    EXPECT_EQ(values(kept.inspect_both_ways(mesh)), measured_anew());
+    std::vector<char> left_out(mesh.carved.triangles.size(), 0);
+    left_out[5] = 1;
+    mesh = without(std::move(mesh), left_out);  // the rest has other numbers
+    EXPECT_EQ(values(kept.inspect_both_ways(mesh)), measured_anew());
 }
 
 TEST(Inspector, LetsAnyTriangleStandForWhatACrossingStandsFor) {
