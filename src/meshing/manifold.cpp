@@ -27,7 +27,7 @@ std::vector<int> boundary_facets(const Tetrahedra& cells, const CellLabels& labe
                                });
 }
 
-/// These by number, and which one follows which around an edge.
+/// These by number, which must stay while they are asked about, and which one follows which around an edge.
 class Boundary {
 public:
     Boundary(const Tetrahedra& cells, const CellLabels& labels, const std::vector<int>& facets)
@@ -44,7 +44,7 @@ public:
     };
     /// The facet on the other side of the edge opposite `corner`, by rotation through inside cells.
     Side mate(int facet, int corner) const {
-        int cell = facets_[facet] >> 2;
+        int cell = this->cell(facet);
         int other = facets_[facet] & 3;                 // the remaining vertex off the edge
         int cross = Tetrahedra::kFacet[other][corner];  // the facet to cross next is opposite this vertex
         while (labels_[cells_.neighbour(cell, cross)]) {
@@ -247,8 +247,7 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
             result.triangles[f] = {polygon[0], polygon[1], polygon[2]};
             for (std::size_t k = 3; k < polygon.size(); ++k) {
                 result.triangles.push_back({polygon[0], polygon[k - 1], polygon[k]});
-                const int facet = result.facet[f];
-                result.facet.push_back(facet);
+                result.facet.push_back(result.facet[f]);
             }
         }
     }

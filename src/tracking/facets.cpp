@@ -9,9 +9,8 @@ namespace isotrack {
 
 int facet_key(const CarvedSurface& carved, std::size_t triangle) {
     const auto& [i, j, k] = carved.triangles[triangle];
-    const bool whole = carved.facet[triangle] >= 0 && carved.particle[i] >= 0 && carved.particle[j] >= 0 &&
-                       carved.particle[k] >= 0;
-    return whole ? carved.facet[triangle] : -1;
+    const bool whole = carved.particle[i] >= 0 && carved.particle[j] >= 0 && carved.particle[k] >= 0;
+    return whole ? carved.facet[triangle] : CarvedSurface::kNoFacet;
 }
 
 Facet MeshFacets::operator[](std::size_t triangle) const {

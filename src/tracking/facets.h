@@ -8,7 +8,7 @@
 
 namespace isotrack {
 
-/// The number of the cell and facet that a triangle is: ascending over a mesh but for halves of split
+/// A triangle's facet, as `CarvedSurface::facet`: ascending over a mesh but for halves of split
 /// triangles and those put in, which have -1.
 int facet_key(const CarvedSurface& carved, std::size_t triangle);
 

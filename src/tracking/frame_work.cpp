@@ -17,6 +17,7 @@ constexpr int kBluntRounds = 3, kBluntPasses = 12;
 /// Makes sharp triangles blunter. The particles stay where they are: the next frame's triangles are others.
 void FrameWork::blunt() {
     const StageTimer timer(frame.seconds, "blunt");
+    mesh.carved.midpoints = std::vector<Vec3>();  // of no more use
     std::vector<const CrossingGrid*> reached = inspector->reached();
     std::vector<float> farthest_before;  // of each triangle
     farthest_before.reserve(inspection.errors->size());

@@ -160,8 +160,8 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     const MeshFacets facets(mesh.carved, mesh.vertices);
     std::vector<const FacetError*> known(facets.size(), nullptr);
     std::vector<char> seen(facets.size(), 0);  // in the mesh before
-    // Where no triangle comes or goes, as when a mesh is made blunter, its errors go where those before are:
-    // another thread's heap need not grow for them.
+    // Where all triangles keep their numbers, as when a mesh is made blunter, and nobody else holds the
+    // errors before, these go to their places: another thread's heap need not grow for them.
     bool in_place = errors_.use_count() == 1 && errors_->size() == facets.size();
     const auto take_same = [&](std::size_t f, std::size_t old) {
         known[f] = &(*errors_)[old];
@@ -414,9 +414,10 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             continue;
         }
         const auto [corner, whole] = corners_of(carved, t);
-        const auto x = whole ? dual_crossing(cells, particles.position, carved.inside_cell(t),
-                                             carved.inside_facet(t), *probe)
-                             : std::nullopt;
+        const auto x = whole && carved.inside_cell(t) >= 0
+                           ? dual_crossing(cells, particles.position, carved.inside_cell(t),
+                                           carved.inside_facet(t), *probe)
+                           : std::nullopt;
         if (x) {  // in the middle of the facet's ball, whose corners a flip may have exchanged
             const int on_ball =
                 cells.vertices[carved.inside_cell(t)][Tetrahedra::kFacet[carved.inside_facet(t)][0]];

@@ -124,9 +124,9 @@ private:
         TriangleIndex triangles;  // of particles
         std::vector<FacetError> errors;
     };
-    std::optional<Expected> expected_;                       // before the first inspection
-    KeptFacets facets_;                                      // of the last inspection
-    std::shared_ptr<std::vector<FacetError>> errors_;        // of each
+    std::optional<Expected> expected_;                 // before the first inspection
+    KeptFacets facets_;                                // of the last inspection
+    std::shared_ptr<std::vector<FacetError>> errors_;  // of each
     std::optional<BetweenCrossings> between_crossings_;
     std::optional<BetweenCrossings::Changes> since_look_;  // between crossings; none: not known
     std::deque<CrossingGrid> between_;                     // points between crossings, as they were found

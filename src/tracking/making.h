@@ -22,7 +22,7 @@ public:
     /// crossings.
     void certify();
     /// Exchanges parts of the mesh for those of the lattice, with no more vertices than they need; all of it
-    /// where it fails nearly everywhere.
+    /// where it fails nearly everywhere. Needs no DT.
     void patch();
     /// Whether the mesh is that of the particles, whatever parts of it were exchanged.
     bool is_of_particles() const { return is_of_particles_; }

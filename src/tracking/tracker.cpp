@@ -403,7 +403,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         Making making(*this, *work);
         making.mesh_particles();
         making.certify();
-        if (will_build_anew()) forget_dt();  // first: much memory, which nothing else needs
+        if (will_build_anew()) forget_dt();  // first: much memory, of no use from here on
         making.patch();
         if (options.method != Method::Paper &&
             making.is_of_particles())  // the next births and deaths go by what is left of errors

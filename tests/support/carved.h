@@ -30,9 +30,7 @@ struct Carved : Samples {
     FrameMesh mesh() const {
         FrameMesh result;
         result.carved = carve(cells, labels, particles.position);
-        std::size_t midpoint = 0;
-        for (const int p : result.carved.particle)
-            result.vertices.push_back(p >= 0 ? particles.position[p] : result.carved.midpoints[midpoint++]);
+        result.vertices = mesh_of(result.carved, particles.position).points;
         return result;
     }
     Carve carve_labels() {

@@ -1,4 +1,4 @@
-// What is missed between lattice crossings.
+// The errors of a mesh, and what is missed between lattice crossings.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -182,12 +182,22 @@ TEST(Inspector, HasTheErrorsOfEachMesh) {
     for (std::size_t v = 3; v < mesh.vertices.size(); v += 11) dent_at(v);
     EXPECT_EQ(values(kept.inspect_both_ways(mesh)), measured_anew());
     EXPECT_EQ(values(held), at_first);
-    held = {};
-    for (std::size_t v = 7; v < mesh.vertices.size(); v += 11) dent_at(v);  // and nobody holds those before
+    // The last are held, too, and then by nobody.
+    for (std::size_t v = 5; v < mesh.vertices.size(); v += 11) dent_at(v);
+    held = kept.inspect_both_ways(mesh);
+    const auto at_last = values(held);
+    for (std::size_t v = 8; v < mesh.vertices.size(); v += 11) dent_at(v);
     EXPECT_EQ(values(kept.inspect_both_ways(mesh)), measured_anew());
+    EXPECT_EQ(values(held), at_last);
+    // Nobody holds those before. As many triangles, but most with another number.
+    for (std::size_t v = 7; v < mesh.vertices.size(); v += 11) dent_at(v);
     std::vector<char> left_out(mesh.carved.triangles.size(), 0);
     left_out[5] = 1;
-    mesh = without(std::move(mesh), left_out);  // the rest has other numbers
+    const auto& [i, j, k] = mesh.carved.triangles[5];
+    const std::vector<Vec3> corners = {mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]};
+    mesh = without(std::move(mesh), left_out);
+    const int first = static_cast<int>(mesh.vertices.size());
+    append(mesh, corners, {{first, first + 1, first + 2}});
     EXPECT_EQ(values(kept.inspect_both_ways(mesh)), measured_anew());
 }
 

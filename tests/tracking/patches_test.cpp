@@ -62,8 +62,6 @@ void expect_patched(const openvdb::FloatGrid::Ptr& grid, const Vec3& place, doub
     EXPECT_EQ(topology.euler, *euler);
     EXPECT_EQ(topology.components, components->size());
     expect_sound(mesh);
-    EXPECT_EQ(std::count(mesh.carved.particle.begin(), mesh.carved.particle.end(), -1),
-              static_cast<std::ptrdiff_t>(mesh.carved.midpoints.size()));
     EXPECT_EQ(mesh.carved.particle.size(), mesh.vertices.size());
     EXPECT_EQ(mesh.carved.facet.size(), mesh.carved.triangles.size());
     // Now there is nothing to patch.
@@ -79,6 +77,7 @@ void expect_patched(const openvdb::FloatGrid::Ptr& grid, const Vec3& place, doub
                              [](int p) { return p >= 0; });
     };
     EXPECT_EQ(on_particles(mesh), on_particles(patched));
+    EXPECT_EQ(unfitted_vertices(mesh.carved, carved.particles.position), mesh.vertices);
     expect_sound(mesh);
     EXPECT_EQ(topology_of(mesh).euler, *euler);
     EXPECT_EQ(topology_of(mesh).components, components->size());

@@ -23,7 +23,7 @@ struct CarvedSurface {
     std::vector<int> facet;
     /// That cell; negative if it came later.
     int inside_cell(std::size_t triangle) const { return facet[triangle] >> 2; }
-    /// The index of that cell's vertex opposite the facet.
+    /// The index of that cell's vertex opposite the facet; without meaning if it came later.
     int inside_facet(std::size_t triangle) const { return facet[triangle] & 3; }
 
     struct Edge {
