@@ -245,18 +245,20 @@ void IncrementalDelaunay::arrange() {
         if (marks_[c] == kUnseen) ++next[key(c) + 1];
     std::partial_sum(next.begin(), next.end(), next.begin());
     std::vector<int> number(slots);
-    for (std::size_t c = 0; c < slots; ++c)
-        if (marks_[c] == kUnseen) number[c] = next[key(c)]++;
+    const std::size_t cells = slots - free_.size();
+    int behind = static_cast<int>(cells);  // free ones are
+    for (std::size_t c = 0; c < slots; ++c) number[c] = marks_[c] == kUnseen ? next[key(c)]++ : behind++;
     for (auto& links : cells_.links)
         for (int& link : links) link = Tetrahedra::link(number[link >> 2], link & 3);
-    // One array after the other, for with both twice a DT would take its most memory here; and back, so that
-    // each stays where it is: places that change would leave holes.
+    // One number of each after the other, for with all twice a DT would take its most memory here; and back,
+    // so that each stays where it is: places that change would leave holes.
+    std::vector<int> ordered(slots);
     const auto put_in_order = [&](std::vector<std::array<int, 4>>& values) {
-        std::vector<std::array<int, 4>> ordered(slots - free_.size());
-        for (std::size_t c = 0; c < slots; ++c)
-            if (marks_[c] == kUnseen) ordered[number[c]] = values[c];
-        values.resize(ordered.size());
-        std::copy(ordered.begin(), ordered.end(), values.begin());
+        for (int k = 0; k < 4; ++k) {
+            for (std::size_t c = 0; c < slots; ++c) ordered[number[c]] = values[c][k];
+            for (std::size_t c = 0; c < cells; ++c) values[c][k] = ordered[c];
+        }
+        values.resize(cells);
     };
     put_in_order(cells_.vertices);
     put_in_order(cells_.links);
