@@ -27,15 +27,15 @@ std::vector<int> boundary_facets(const Tetrahedra& cells, const CellLabels& labe
                                });
 }
 
-/// These by number, which must stay while they are asked about, and which one follows which around an edge.
+/// These facets of a surface by number, which must stay while they are asked about, and which one follows
+/// which around an edge.
 class Boundary {
 public:
-    Boundary(const Tetrahedra& cells, const CellLabels& labels, const std::vector<int>& facets)
-        : cells_(cells), labels_(labels), facets_(facets) {}
-    int cell(std::size_t facet) const { return facets_[facet] >> 2; }
+    Boundary(const Tetrahedra& cells, const CellLabels& labels, const CarvedSurface& surface)
+        : cells_(cells), labels_(labels), surface_(surface) {}
     Triangle particles(std::size_t facet) const {
-        const auto& v = cells_.vertices[cell(facet)];
-        const auto& f = Tetrahedra::kFacet[facets_[facet] & 3];
+        const auto& v = cells_.vertices[surface_.inside_cell(facet)];
+        const auto& f = Tetrahedra::kFacet[surface_.inside_facet(facet)];
         return {v[f[0]], v[f[1]], v[f[2]]};
     }
 
@@ -44,8 +44,8 @@ public:
     };
     /// The facet on the other side of the edge opposite `corner`, by rotation through inside cells.
     Side mate(int facet, int corner) const {
-        int cell = this->cell(facet);
-        int other = facets_[facet] & 3;                 // the remaining vertex off the edge
+        int cell = surface_.inside_cell(facet);
+        int other = surface_.inside_facet(facet);       // the remaining vertex off the edge
         int cross = Tetrahedra::kFacet[other][corner];  // the facet to cross next is opposite this vertex
         while (labels_[cells_.neighbour(cell, cross)]) {
             const int next = cells_.neighbour(cell, cross);
@@ -55,15 +55,16 @@ public:
             cross = cells_.index_of(next, pivot);
             other = entry;
         }
-        const auto at = std::lower_bound(facets_.begin(), facets_.end(), Tetrahedra::link(cell, cross));
+        const auto& facets = surface_.facet;
+        const auto at = std::lower_bound(facets.begin(), facets.end(), Tetrahedra::link(cell, cross));
         const auto& f = Tetrahedra::kFacet[cross];
-        return {static_cast<int>(at - facets_.begin()), f[0] == other ? 0 : f[1] == other ? 1 : 2};
+        return {static_cast<int>(at - facets.begin()), f[0] == other ? 0 : f[1] == other ? 1 : 2};
     }
 
 private:
     const Tetrahedra& cells_;
     const CellLabels& labels_;
-    const std::vector<int>& facets_;
+    const CarvedSurface& surface_;
 };
 
 struct HalfEdge {
@@ -110,7 +111,7 @@ bool is_fan(int v, const Corners& corners, const std::vector<Triangle>& triangle
 CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std::vector<Vec3>& points) {
     CarvedSurface result;
     result.facet = boundary_facets(cells, labels);
-    const Boundary boundary(cells, labels, result.facet);
+    const Boundary boundary(cells, labels, result);
     const std::size_t count = result.facet.size();
     const auto for_each_facet = [&](const auto& body) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1024), [&](const auto& range) {
@@ -170,7 +171,7 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
         for (const int c : copy.cycle)
             result.triangles[c / 3][c % 3] = static_cast<int>(result.particle.size());
         result.particle.push_back(copy.particle);
-        result.pinched.push_back({copy.particle, boundary.cell(copy.corner / 3)});
+        result.pinched.push_back({copy.particle, result.inside_cell(copy.corner / 3)});
     }
     std::stable_sort(result.pinched.begin(), result.pinched.end(),
                      [](const auto& a, const auto& b) { return a.particle < b.particle; });
@@ -194,7 +195,7 @@ CarvedSurface carve(const Tetrahedra& cells, const CellLabels& labels, const std
         const bool repeated = a.from == b.from && a.to == b.to;
         const bool counted = e >= 2 && raw_edges[e - 2].from == b.from && raw_edges[e - 2].to == b.to;
         if (!repeated || counted || a.from > a.to) continue;
-        result.complex_edges.push_back({a.from, a.to, boundary.cell(a.triangle)});
+        result.complex_edges.push_back({a.from, a.to, result.inside_cell(a.triangle)});
     }
 
     // Different edges between the same two output vertices: they get midpoints. Mates keep the pairs apart.

@@ -81,6 +81,7 @@ TEST_P(FitOfABox, MovesVerticesAndFlipsEdges) {
     EXPECT_LE(
         sharpest_cotangent(first.vertices, first.carved.triangles),
         std::max(std::sqrt(3.0), sharpest_cotangent(unfitted.vertices, unfitted.carved.triangles)) + 1e-5);
+    EXPECT_EQ(first.carved.particle, unfitted.carved.particle);
     EXPECT_EQ(first.carved.facet, unfitted.carved.facet);
 }
 

@@ -63,11 +63,20 @@ TEST(Inspector, FindsWhatIsMissedBetweenCrossingsThatAreReached) {
     EXPECT_GT(found, 0);
 }
 
-TEST(Inspector, FindsTheSameBetweenCrossingsByWhatChanged) {
-    const auto box = shapes::box({0.01, 0.02, 0.03}, {1.0, 0.7, 0.45}, kResolution);
-    const CrossingGrid crossings(*box);
-    const Carved carved(*box, 0.04);
-    const FrameMesh mesh = carved.mesh();
+/// A box and its mesh, which takes dents.
+struct InspectorOfABox : ::testing::Test {
+    const shapes::SurfacePtr box = shapes::box({0.01, 0.02, 0.03}, {1.0, 0.7, 0.45}, kResolution);
+    const CrossingGrid crossings{*box};
+    Carved carved{*box, 0.06};
+    FrameMesh mesh = carved.mesh();
+
+    void dent_at(std::size_t v) {
+        Vec3& p = mesh.vertices[v];
+        p = to_float_precision(p * (1.0 - 0.05 / p.norm()));
+    }
+};
+
+TEST_F(InspectorOfABox, FindsTheSameBetweenCrossingsByWhatChanged) {
     const auto& triangles = mesh.carved.triangles;
     constexpr double kTolerance = 0.06, kCutoff = 3.0 * kTolerance;
     BetweenCrossings all(*box, crossings, {}, kTolerance), by_changes(*box, crossings, {}, kTolerance);
@@ -89,7 +98,7 @@ TEST(Inspector, FindsTheSameBetweenCrossingsByWhatChanged) {
     EXPECT_EQ(sorted(all.points(mesh.vertices, triangles, measured(mesh.vertices))),
               sorted(by_changes.points(mesh.vertices, triangles, measured(mesh.vertices))));
     std::size_t found = 0;
-    std::vector<Vec3> vertices = mesh.vertices;
+    const auto& vertices = mesh.vertices;
     for (std::size_t v = 5; v < vertices.size(); v += vertices.size() / 7) {  // one dent after the other
         const auto facets = [&] {
             std::vector<Facet> result;
@@ -102,7 +111,7 @@ TEST(Inspector, FindsTheSameBetweenCrossingsByWhatChanged) {
         };
         FacetChanges changes;
         changes.went = facets();
-        vertices[v] = to_float_precision(vertices[v] * (1.0 - 0.05 / vertices[v].norm()));
+        dent_at(v);
         changes.came = facets();
         changes.around = triangles_near_gone(changes.went, 2.01 * kCutoff, vertices, triangles);
         BetweenCrossings::Changes changed;
@@ -116,12 +125,7 @@ TEST(Inspector, FindsTheSameBetweenCrossingsByWhatChanged) {
     EXPECT_GT(found, 20u);
 }
 
-TEST(Inspector, KnowsWhatChangedSinceItLookedBetweenCrossings) {
-    const auto box = shapes::box({0.01, 0.02, 0.03}, {1.0, 0.7, 0.45}, kResolution);
-    const CrossingGrid crossings(*box);
-    Carved carved(*box, 0.04);
-    carved.limits.tolerance = 0.06;
-    FrameMesh mesh = carved.mesh();
+TEST_F(InspectorOfABox, KnowsWhatChangedSinceItLookedBetweenCrossings) {
     Inspector kept(*box, carved.limits, crossings), anew(*box, carved.limits, crossings);
     const auto look = [&](Inspector& inspector) {
         Inspection inspection = inspector.inspect_both_ways(mesh);
@@ -144,8 +148,7 @@ TEST(Inspector, KnowsWhatChangedSinceItLookedBetweenCrossings) {
     for (std::size_t v = 5; v + apart / 2 < mesh.vertices.size(); v += apart) {
         // Two dents at places of their own, the first of which is there at the second inspection, too.
         for (const std::size_t dent : {v, v + apart / 2}) {
-            Vec3& p = mesh.vertices[dent];
-            p = to_float_precision(p * (1.0 - 0.05 / p.norm()));
+            dent_at(dent);
             kept.inspect_both_ways(mesh);
         }
         look(kept);
@@ -156,12 +159,7 @@ TEST(Inspector, KnowsWhatChangedSinceItLookedBetweenCrossings) {
     EXPECT_GT(found_by(kept).size(), at_first + 20);
 }
 
-TEST(Inspector, HasTheErrorsOfEachMesh) {
-    const auto box = shapes::box({0.01, 0.02, 0.03}, {1.0, 0.7, 0.45}, kResolution);
-    const CrossingGrid crossings(*box);
-    Carved carved(*box, 0.04);
-    carved.limits.tolerance = 0.06;
-    FrameMesh mesh = carved.mesh();
+TEST_F(InspectorOfABox, HasTheErrorsOfEachMesh) {
     for (Vec3& p : mesh.vertices) p = to_float_precision(p);
     Inspector kept(*box, carved.limits, crossings);
     const auto values = [](const Inspection& inspection) {
@@ -176,9 +174,6 @@ TEST(Inspector, HasTheErrorsOfEachMesh) {
     Inspection held = kept.inspect_both_ways(mesh);  // as trials of other meshes do
     const auto at_first = values(held);
     EXPECT_EQ(at_first, measured_anew());
-    const auto dent_at = [&](std::size_t v) {
-        mesh.vertices[v] = to_float_precision(mesh.vertices[v] * (1.0 - 0.05 / mesh.vertices[v].norm()));
-    };
     for (std::size_t v = 3; v < mesh.vertices.size(); v += 11) dent_at(v);
     EXPECT_EQ(values(kept.inspect_both_ways(mesh)), measured_anew());
     EXPECT_EQ(values(held), at_first);
