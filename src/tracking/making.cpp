@@ -18,7 +18,9 @@ namespace isotrack {
 namespace {
 
 constexpr int kMostMendings = 1;
-constexpr double kFew = 0.03;  // of the particles: few enough to be added by certify, without relaxation
+// Of the particles: few enough to be added by certify, without relaxation. Those of the frame before have
+// room already; a fit holds what is left of the mean square better where newborn get some, too.
+constexpr double kFew = 0.03, kFewWarm = 0.06;
 constexpr double kThick = 3.0, kThickNodes = 6.0;  // tolerances, resolutions: of a solid without thin parts
 constexpr int kCertifyRounds = 24;
 constexpr int kMostTrials = 2;        // rounds of other labels: each takes some meshes
@@ -44,6 +46,7 @@ bool Tracker::Impl::Making::is_thick() const {
 void Tracker::Impl::Making::mesh_particles() {
     Inspector& inspector = *work_.inspector;
     LastMesh& last_mesh = tracker_.last_mesh;
+    const double few = warm_ && !options().fit ? kFewWarm : kFew;
     for (int mending = 0;; ++mending) {
         std::function<void()> measure_expected;
         if (!options().fit && !in_paper())
@@ -62,7 +65,7 @@ void Tracker::Impl::Making::mesh_particles() {
         densifier_.emplace(tracker_.make_densifier(work_.surface, work_.limits, work_.crossings->size()));
         added_ = mend();
         if (mending == kMostMendings ||
-            static_cast<double>(added_) < kFew * static_cast<double>(particles().size()))
+            static_cast<double>(added_) < few * static_cast<double>(particles().size()))
             break;
         // What is known of this mesh has no use any more.
         work_.inspection = {};

@@ -8,10 +8,11 @@
 
 namespace isotrack {
 
-/// A frame on its way from particles in place to a mesh that passes. All references must outlive it.
+/// A frame on its way from particles in place to a mesh that passes. All references must outlive it. `warm`:
+/// some particles are of the frame before.
 class Tracker::Impl::Making {
 public:
-    Making(Impl& tracker, FrameWork& work) : tracker_(tracker), work_(work) {
+    Making(Impl& tracker, FrameWork& work, bool warm) : tracker_(tracker), work_(work), warm_(warm) {
         work.inspector.emplace(work.surface, work.limits, *work.crossings);
     }
 
@@ -56,6 +57,7 @@ private:
 
     Impl& tracker_;
     FrameWork& work_;
+    const bool warm_;
     Fitted fitted_;
     std::optional<Densifier> densifier_;  // none in the paper's method, which mends nothing
     std::size_t added_ = 0;

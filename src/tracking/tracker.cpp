@@ -346,7 +346,7 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
 }
 
 /// Brings the particles to the surface, and their number and spacing to what it wants.
-void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
+bool Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     const Surface& surface = work.surface;
     const SizingLimits& l = work.limits;
     TrackedFrame& frame = work.frame;
@@ -373,6 +373,7 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
         follow(surface, *work.crossings, l, kFollowing, warm, frame);
     else
         sample(surface, *work.crossings, l, warm, frame);
+    return warm;
 }
 
 /// Gives the mesh the ids and velocities of its particles.
@@ -398,9 +399,9 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
                       before = particles.size();
     first_of_frame = next_id;
 
-    place_particles(motion, *work);
+    const bool warm = place_particles(motion, *work);
     {  // which frees what is of no use to a mesh that passes
-        Making making(*this, *work);
+        Making making(*this, *work, warm);
         making.mesh_particles();
         making.certify();
         if (will_build_anew()) forget_dt();  // first: much memory, of no use from here on
