@@ -66,10 +66,14 @@ namespace {
 struct MetricTriangle {
     const Particles& particles;
     const Triangle& corner;
-    double side2[3];  // squared, opposite each corner
-    double area2_16;  // 16 times the squared area
+    const Metric metric[3];  // of each corner
+    double side2[3];         // squared, opposite each corner
+    double area2_16;         // 16 times the squared area
 
-    MetricTriangle(const Particles& of, const Triangle& triangle) : particles(of), corner(triangle) {
+    MetricTriangle(const Particles& of, const Triangle& triangle)
+        : particles(of),
+          corner(triangle),
+          metric{metric_of(of, triangle[0]), metric_of(of, triangle[1]), metric_of(of, triangle[2])} {
         for (int k = 0; k < 3; ++k)
             side2[k] =
                 square(particles.position[corner[(k + 2) % 3]] - particles.position[corner[(k + 1) % 3]]);
@@ -77,9 +81,7 @@ struct MetricTriangle {
                    (side2[0] * side2[0] + side2[1] * side2[1] + side2[2] * side2[2]);
     }
     double square(const Vec3& r) const {
-        double sum = 0.0;
-        for (const int i : corner) sum += metric_of(particles, static_cast<std::size_t>(i)).square(r);
-        return sum / 3.0;
+        return (metric[0].square(r) + metric[1].square(r) + metric[2].square(r)) / 3.0;
     }
     double circumradius() const { return std::sqrt(side2[0] * side2[1] * side2[2] / area2_16); }
     Vec3 circumcentre() const {
