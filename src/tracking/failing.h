@@ -39,7 +39,7 @@ inline bool angles_matter(const Particles& particles, const Triangle& corner, do
 /// Whether its particles make it too sharp, where that matters.
 inline bool is_needle(const Particles& particles, const Triangle& corner, double detail) {
     const auto& at = particles.position;
-    return sharpness(at[corner[0]], at[corner[1]], at[corner[2]]) > kSharpnessAt22Degrees &&
+    return is_sharper(kSharpnessAt22Degrees, at[corner[0]], at[corner[1]], at[corner[2]]) &&
            angles_matter(particles, corner, detail);
 }
 

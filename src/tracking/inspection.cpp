@@ -46,8 +46,9 @@ Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
     return result;
 }
 
-/// The middle between the particles of the longest edge of a triangle that is too sharp across a crease or a
-/// rim: where that edge lies along the crease neither the other diagonal nor moving corners would do.
+/// The middle between the particles of the longest edge of a triangle, too sharp across a crease or a rim:
+/// where that edge lies along the crease neither the other diagonal nor moving corners would do. None where
+/// it is thin.
 std::optional<Shortage> crease_shortage(const FrameMesh& mesh, const Particles& particles,
                                         std::size_t triangle, const Triangle& corner, double detail) {
     constexpr double kLeastHeight = 1.0;  // details: what is thinner has needles anyway
@@ -56,9 +57,6 @@ std::optional<Shortage> crease_shortage(const FrameMesh& mesh, const Particles& 
     const auto edge = [&](int k) -> Vec3 {
         return mesh.vertices[t[(k + 2) % 3]] - mesh.vertices[t[(k + 1) % 3]];
     };
-    if (!(sharpness(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]) > kSharpnessAt18Degrees) ||
-        angles_matter(particles, corner, detail))
-        return std::nullopt;
     int k = 0;
     for (int i = 1; i < 3; ++i)
         if (edge(i).squaredNorm() > edge(k).squaredNorm()) k = i;
@@ -94,15 +92,6 @@ std::vector<Vec3> crossings_around(const std::vector<Vec3>& places, const Surfac
     std::vector<Vec3> result;
     for (const auto& [x, y, z] : found) result.emplace_back(x, y, z);
     return result;
-}
-
-/// After the fit, too.
-bool is_needle_even_fitted(const FrameMesh& mesh, const Particles& particles, std::size_t triangle,
-                           const Triangle& corner, double detail) {
-    const auto& [i, j, k] = mesh.carved.triangles[triangle];
-    return is_needle(particles, corner, detail) ||
-           (sharpness(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]) > kSharpnessAt18Degrees &&
-            angles_matter(particles, corner, detail));
 }
 
 }  // namespace
@@ -398,10 +387,14 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
         for (std::size_t t = begin; t < end; ++t) {
             const auto [corner, whole] = corners_of(carved, t);
             const FacetError& error = (*inspection.errors)[t];
+            const auto& [i, j, k] = carved.triangles[t];
+            const auto& at = mesh.vertices;  // after a fit, too
+            const bool is_sharp = whole && is_sharper(kSharpnessAt18Degrees, at[i], at[j], at[k]);
             if (is_too_far(error, limits.tolerance) || is_turned(error) ||
-                (whole && is_needle_even_fitted(mesh, particles, t, corner, limits.detail)))
+                (whole && is_needle(particles, corner, limits.detail)) ||
+                (is_sharp && angles_matter(particles, corner, limits.detail)))
                 found.push_back({t, std::nullopt});
-            else if (whole)
+            else if (is_sharp)
                 if (auto at_crease = crease_shortage(mesh, particles, t, corner, limits.detail))
                     found.push_back({t, at_crease});
         }
