@@ -16,7 +16,8 @@ public:
         work.inspector.emplace(work.surface, work.limits, *work.crossings);
     }
 
-    /// Meshes the particles. Once, when many have to be added, their surroundings make room for them.
+    /// Meshes the particles. Once, when many have to be added (three in a hundred; six where those that are
+    /// there were relaxed in frames before and nothing is fitted), their surroundings make room for them.
     void mesh_particles();
     /// Adds particles, and changes labels, until the mesh passes or nothing more can be done. The topology,
     /// which takes longer to look at, is looked at when all else passes, and so is what lies between
