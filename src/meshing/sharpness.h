@@ -17,7 +17,7 @@ inline double sharpness(const Vec3& p, const Vec3& q, const Vec3& r) {
     return std::max({-u.dot(w), -v.dot(u), -w.dot(v)}) / u.cross(v).norm();
 }
 
-/// Whether a triangle's sharpness is larger than `sharpness` (> 0): as asking for it, but faster.
+/// Whether a triangle's sharpness is larger than `sharpness` (> 0): as asking for it, but faster; NaN is.
 inline bool is_sharper(double sharpness, const Vec3& p, const Vec3& q, const Vec3& r) {
     const Vec3 u = q - p, v = r - q, w = p - r;
     const double most = std::max({-u.dot(w), -v.dot(u), -w.dot(v)});

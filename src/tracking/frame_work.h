@@ -20,6 +20,7 @@ struct FrameWork {
     std::optional<CrossingGrid> crossings;
     std::optional<Inspector> inspector;  ///< Of this mesh.
     Inspection inspection;
+    bool follows = false;  ///< Most particles are of the frame before; else they are sampled anew.
 
     /// Makes the triangles better as far as the mesh goes on reaching all it reached and none gets beyond the
     /// tolerance, and hands the frame over. Needs nothing of the tracker, which may be at the next frames.

@@ -46,9 +46,9 @@ Corners corners_of(const CarvedSurface& carved, std::size_t triangle) {
     return result;
 }
 
-/// The middle between the particles of the longest edge of a triangle, too sharp across a crease or a rim:
-/// where that edge lies along the crease neither the other diagonal nor moving corners would do. None where
-/// it is thin.
+/// For a triangle that is too sharp across a crease or a rim: the middle between the particles of its longest
+/// edge. Where that edge lies along the crease neither the other diagonal nor moving corners would do. None
+/// for one less than a detail high.
 std::optional<Shortage> crease_shortage(const FrameMesh& mesh, const Particles& particles,
                                         std::size_t triangle, const Triangle& corner, double detail) {
     constexpr double kLeastHeight = 1.0;  // details: what is thinner has needles anyway
@@ -388,7 +388,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             const auto [corner, whole] = corners_of(carved, t);
             const FacetError& error = (*inspection.errors)[t];
             const auto& [i, j, k] = carved.triangles[t];
-            const auto& at = mesh.vertices;  // after a fit, too
+            const auto& at = mesh.vertices;  // where a fit put them
             const bool is_sharp = whole && is_sharper(kSharpnessAt18Degrees, at[i], at[j], at[k]);
             if (is_too_far(error, limits.tolerance) || is_turned(error) ||
                 (whole && is_needle(particles, corner, limits.detail)) ||

@@ -18,9 +18,8 @@ namespace isotrack {
 namespace {
 
 constexpr int kMostMendings = 1;
-// Of the particles: few enough to be added by certify, without relaxation. Those of the frame before have
-// room already; a fit holds what is left of the mean square better where newborn get some, too.
-constexpr double kFew = 0.03, kFewWarm = 0.06;
+constexpr double kFew = 0.03;  // of the particles: few enough to be added by certify, without relaxation
+constexpr double kFewFollowing = 0.06;  // likewise where frames before were relaxed, and nothing is fitted
 constexpr double kThick = 3.0, kThickNodes = 6.0;  // tolerances, resolutions: of a solid without thin parts
 constexpr int kCertifyRounds = 24;
 constexpr int kMostTrials = 2;        // rounds of other labels: each takes some meshes
@@ -46,7 +45,7 @@ bool Tracker::Impl::Making::is_thick() const {
 void Tracker::Impl::Making::mesh_particles() {
     Inspector& inspector = *work_.inspector;
     LastMesh& last_mesh = tracker_.last_mesh;
-    const double few = warm_ && !options().fit ? kFewWarm : kFew;
+    const double few = work_.follows && !options().fit ? kFewFollowing : kFew;
     for (int mending = 0;; ++mending) {
         std::function<void()> measure_expected;
         if (!options().fit && !in_paper())

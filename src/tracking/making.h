@@ -8,16 +8,15 @@
 
 namespace isotrack {
 
-/// A frame on its way from particles in place to a mesh that passes. All references must outlive it. `warm`:
-/// some particles are of the frame before.
+/// A frame on its way from particles in place to a mesh that passes. All references must outlive it.
 class Tracker::Impl::Making {
 public:
-    Making(Impl& tracker, FrameWork& work, bool warm) : tracker_(tracker), work_(work), warm_(warm) {
+    Making(Impl& tracker, FrameWork& work) : tracker_(tracker), work_(work) {
         work.inspector.emplace(work.surface, work.limits, *work.crossings);
     }
 
-    /// Meshes the particles. Once, when many have to be added (three in a hundred; six where those that are
-    /// there were relaxed in frames before and nothing is fitted), their surroundings make room for them.
+    /// Meshes the particles. Once, when many have to be added, their surroundings make room for them: of the
+    /// particles of a new sampling, and under a fit, fewer count as many.
     void mesh_particles();
     /// Adds particles, and changes labels, until the mesh passes or nothing more can be done. The topology,
     /// which takes longer to look at, is looked at when all else passes, and so is what lies between
@@ -58,7 +57,6 @@ private:
 
     Impl& tracker_;
     FrameWork& work_;
-    const bool warm_;
     Fitted fitted_;
     std::optional<Densifier> densifier_;  // none in the paper's method, which mends nothing
     std::size_t added_ = 0;

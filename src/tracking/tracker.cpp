@@ -346,7 +346,7 @@ void Tracker::Impl::sample_as_in_paper(const Surface& surface, const SizingLimit
 }
 
 /// Brings the particles to the surface, and their number and spacing to what it wants.
-bool Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
+void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     const Surface& surface = work.surface;
     const SizingLimits& l = work.limits;
     TrackedFrame& frame = work.frame;
@@ -367,13 +367,14 @@ bool Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
         if (warm) frame.seeded = cover(particles, surface, *work.crossings, l, options.seed, next_id, apart);
     }
     if (!warm) seed(surface, *work.crossings, l, apart, frame);
+    work.follows =
+        warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size());
     if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
-    else if (warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size()))
+    else if (work.follows)
         follow(surface, *work.crossings, l, kFollowing, warm, frame);
     else
         sample(surface, *work.crossings, l, warm, frame);
-    return warm;
 }
 
 /// Gives the mesh the ids and velocities of its particles.
@@ -399,9 +400,9 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
                       before = particles.size();
     first_of_frame = next_id;
 
-    const bool warm = place_particles(motion, *work);
+    place_particles(motion, *work);
     {  // which frees what is of no use to a mesh that passes
-        Making making(*this, *work, warm);
+        Making making(*this, *work);
         making.mesh_particles();
         making.certify();
         if (will_build_anew()) forget_dt();  // first: much memory, of no use from here on

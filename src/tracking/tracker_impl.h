@@ -82,8 +82,7 @@ struct Tracker::Impl {
     void sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, bool warm,
                 TrackedFrame& frame);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
-    /// Returns whether any were there before.
-    bool place_particles(const Motion& motion, FrameWork& work);
+    void place_particles(const Motion& motion, FrameWork& work);
     void name_vertices(const FrameMesh& mesh, TriangleMesh& named);
     class Making;
     Finish begin(const Surface& surface, const Motion& motion);

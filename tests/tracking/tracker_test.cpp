@@ -310,15 +310,21 @@ TEST(Tracker, AddsAFewToThoseBeforeWithoutTetrahedralisingAgain) {
     // A ball that is stretched to a sheet: most frames want a few per cent more.
     SampleSequence sequence("enright");
     Tracker tracker(with_tolerance(0.005));
-    int with_some = 0;
+    int with_some = 0, with_many = 0;
     for (int f = 0; f < 6; ++f) {
         const TrackedFrame frame = tracker.advance(LevelSet(sequence.next().surface));
+        if (frame.seeded > 0) continue;  // sampled anew where much is
+        // All but a few of them come when the mesh is held against the surface.
         const double born = static_cast<double>(frame.born) / static_cast<double>(frame.particles);
-        if (f == 0 || born >= 0.06) continue;
-        EXPECT_EQ(frame.rebuilt, 1u) << "frame " << f;
-        with_some += born > 0.035;
+        if (born < 0.06) {
+            EXPECT_EQ(frame.rebuilt, 1u) << "frame " << f;
+            with_some += born > 0.035;
+        } else {
+            with_many += frame.rebuilt > 1;
+        }
     }
     EXPECT_GT(with_some, 0);
+    EXPECT_GT(with_many, 0);
 }
 
 TEST(Tracker, KeepsMostIdsWhenTheMotionIsSlow) {
