@@ -9,18 +9,14 @@
 #include "isotrack/surface/rasterise.h"
 #include "isotrack/surface/shapes.h"
 #include "isotrack/tracking/tracker.h"
+#include "support/tracked.h"
 
 namespace isotrack {
 namespace {
 
 using shapes::SurfacePtr;
-constexpr double kVoxel = 0.05;
-
-TrackerOptions with_tolerance(double tolerance) {
-    TrackerOptions options;
-    options.tolerance = tolerance;
-    return options;
-}
+using support::kVoxel;
+using support::with_tolerance;
 
 TEST(MovingAndResting, GivesTheMotionAlongTheSurfaceAsVelocity) {
     // Nobody tells how it moves, and most of it moves along itself.
