@@ -74,7 +74,7 @@ void refine(Surface::Probe& probe, const Vec3& a, const Vec3& ab, const Vec3& ac
 }
 
 Survey survey(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe, int steps,
-              double refine_above) {
+              double refine_above, double too_much = std::numeric_limits<double>::infinity()) {
     Survey result;
     TriangleError& error = result.error;
     Sample outside, inside;  // the farthest on either side
@@ -101,12 +101,13 @@ Survey survey(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe
         if (i > 0) result.steepest = std::max(result.steepest, std::abs(value - here[-row_before]) * across);
         if (j > 0) result.steepest = std::max(result.steepest, std::abs(value - here[-1]) * along);
     });
+    const bool may_do = std::max(outside.distance, inside.distance) <= too_much;
     std::optional<TriangleQuadratic> quadratic;
-    if (std::max(outside.distance, inside.distance) > refine_above && steps >= kFewestSteps &&
+    if (may_do && std::max(outside.distance, inside.distance) > refine_above && steps >= kFewestSteps &&
         steps <= kMostSteps)
         quadratic.emplace(values.data(), steps);
     const auto refine_side = [&](double sign, Sample& farthest) {
-        if (farthest.distance > refine_above)
+        if (may_do && farthest.distance > refine_above)
             refine(probe, a, b - a, c - a, steps, sign, refine_above, quadratic, farthest);
     };
     refine_side(1.0, outside);
@@ -166,9 +167,10 @@ int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double detail) {
 }
 
 TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
-                              double detail, double refine_above) {
+                              double detail, double refine_above, double too_much) {
     const int steps = error_steps(a, b, c, detail);
-    auto [error, steepest] = survey(a, b, c, probe, steps, refine_above);
+    auto [error, steepest] = survey(a, b, c, probe, steps, refine_above, too_much);
+    if (error.largest > too_much) return error;
     if (steps < kMostSteps && (error.largest > kAlmost * refine_above || steepest > kSteep)) {
         const TriangleError again = triangle_error(a, b, c, probe, kMostSteps, refine_above);
         if (again.largest > error.largest) error = again;

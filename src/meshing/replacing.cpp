@@ -45,7 +45,7 @@ bool ReplaceableMesh::may_have(const std::vector<Places>& candidates, const Repl
     if (!(facing_of(candidates, probe) > std::min(kFacing, before.facing))) return false;
     const auto passes = [&](const Places& t) {
         const auto& [a, b, c] = t;
-        const TriangleError error = certified_error(a, b, c, probe, detail, 0.5 * tolerance);
+        const TriangleError error = certified_error(a, b, c, probe, detail, 0.5 * tolerance, tolerance);
         return error.largest <= tolerance && error.turned_deg <= kMostTurnedDeg;
     };
     if (!std::all_of(candidates.begin(), candidates.end(), passes)) return false;

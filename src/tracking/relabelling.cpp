@@ -61,12 +61,12 @@ std::size_t reach_out(CellLabels& labels, const Tetrahedra& cells, const FrameMe
         for (int k = 0; k < 4; ++k) {
             if (!tips[v[k]] || labels[c] == labels[cells.neighbour(static_cast<int>(c), k)]) continue;
             double error = 0.0;
-            for (int side = 0; side < 4; ++side) {
+            for (int side = 0; side < 4 && error <= tolerance; ++side) {
                 if (side == k) continue;
                 const auto& [i, j, l] = Tetrahedra::kFacet[side];
                 error = std::max(error, certified_error(particles.position[v[i]], particles.position[v[j]],
                                                         particles.position[v[l]], *probe, limits.detail,
-                                                        kSuspect * limits.tolerance)
+                                                        kSuspect * limits.tolerance, tolerance)
                                             .largest);
             }
             if (error <= tolerance && error < tips[v[k]]->error)

@@ -208,8 +208,8 @@ private:
             return std::abs(probe.farther_value(middle)) <= limits_.error;
         };
         const auto passes = [&](const Triangle& t) {
-            const TriangleError error =
-                certified_error(at[t[0]], at[t[1]], at[t[2]], probe, limits_.detail, limits_.error);
+            const TriangleError error = certified_error(at[t[0]], at[t[1]], at[t[2]], probe, limits_.detail,
+                                                        limits_.error, limits_.error);
             return error.largest <= limits_.error && error.turned_deg <= kMostTurnedDeg;
         };
         const auto all = [&](const auto& which) {
