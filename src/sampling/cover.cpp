@@ -42,36 +42,39 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     if (grid.empty()) return 0;
     const double spacing = grid.spacing();
     std::vector<std::atomic<char>> covered(grid.size());  // marked by several threads
-    // Of `some` of the crossings, which have these numbers. `else_reach`: where the surface is not flat.
-    const auto mark_some = [&](const CrossingGrid& some, const auto& number, const Vec3& p, const Vec3& n,
-                               double reach, double else_reach) {
+    /// What a particle covers. `else_reach`: where the surface is not flat.
+    struct Patch {
+        Vec3 p, n;
+        double reach, else_reach;
+    };
+    const auto patch_of = [&](const Vec3& p, const Vec3& n, double reach, double else_reach) -> Patch {
         // A crossing lies within a cell's diagonal of its neighbours.
-        reach = std::max(reach, 1.2 * spacing);
-        else_reach = std::max(else_reach, 1.2 * spacing);
-        const auto mark_one = [&](std::size_t c) {
-            if (covered[number(c)].load(std::memory_order_relaxed)) return;
-            const Surface::Crossing crossing = some[c];
-            const Vec3 way = crossing.point - p;
-            const double near = crossing.flat ? reach : else_reach;
-            if (way.squaredNorm() > near * near ||
-                std::abs(n.dot(way)) >= std::max(kOffPlane * near, 0.5 * spacing))
-                return;
-            const double facing = n.dot(crossing.outward.cast<double>());
-            if (facing > kRounding ||
-                (facing > -kGrazing && way.squaredNorm() < kHere * spacing * kHere * spacing))
+        return {p, n, std::max(reach, 1.2 * spacing), std::max(else_reach, 1.2 * spacing)};
+    };
+    const auto covers = [&](const Patch& patch, const Surface::Crossing& crossing) {
+        const Vec3 way = crossing.point - patch.p;
+        const double near = crossing.flat ? patch.reach : patch.else_reach;
+        if (way.squaredNorm() > near * near ||
+            std::abs(patch.n.dot(way)) >= std::max(kOffPlane * near, 0.5 * spacing))
+            return false;
+        const double facing = patch.n.dot(crossing.outward.cast<double>());
+        return facing > kRounding ||
+               (facing > -kGrazing && way.squaredNorm() < kHere * spacing * kHere * spacing);
+    };
+    // Of `some` of the crossings, which have these numbers.
+    const auto mark = [&](const CrossingGrid& some, const auto& number, const Patch& patch) {
+        const Vec3 reach = Vec3::Constant(patch.reach);
+        some.for_each_in(Box(patch.p - reach, patch.p + reach), [&](std::size_t c) {
+            if (!covered[number(c)].load(std::memory_order_relaxed) && covers(patch, some[c]))
                 covered[number(c)].store(1, std::memory_order_relaxed);
-        };
-        some.for_each_in(Box(p - Vec3::Constant(reach), p + Vec3::Constant(reach)), mark_one);
+        });
     };
     const auto own_number = [](std::size_t c) { return c; };
-    const auto mark = [&](const Vec3& p, const Vec3& n, double reach, double else_reach) {
-        mark_some(grid, own_number, p, n, reach, else_reach);
-    };
     const auto mark_all = [&](double share, const CrossingGrid& some, const auto& number) {
         constexpr std::size_t kParticles = 64;  // a thread's at least
         parallel_for_each(particles.size(), kParticles, [&](std::size_t i) {
             const double reach = share * particles.spacing[i];
-            mark_some(some, number, particles.position[i], particles.normal[i], reach, reach);
+            mark(some, number, patch_of(particles.position[i], particles.normal[i], reach, reach));
         });
     };
     if (particles.size() > 0) {
@@ -120,15 +123,20 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
                 Surface::Probe& probe = probes.local();
                 for (std::size_t i = range.begin(); i < range.end(); ++i) seeds[i] = seed_at(batch[i], probe);
             });
+            std::vector<Patch> sown;
             for (std::size_t i = 0; i < batch.size(); ++i) {
-                if (covered[batch[i]]) continue;
+                const Surface::Crossing crossing = grid[batch[i]];
+                if (std::any_of(sown.begin(), sown.end(),
+                                [&](const Patch& patch) { return covers(patch, crossing); }))
+                    continue;
                 covered[batch[i]] = 1;
                 const auto& [p, n, h] = seeds[i];
                 if (!(h > 0.0)) continue;
                 particles.add(p, n, h, next_id++);
-                mark(p, n, apart * h, apart * std::min(h, largest));
-                ++added;
+                sown.push_back(patch_of(p, n, apart * h, apart * std::min(h, largest)));
             }
+            added += sown.size();
+            parallel_for_each(sown.size(), 8, [&](std::size_t i) { mark(grid, own_number, sown[i]); });
         }
     };
     // Put in order a part at a time: most of the later ones are covered by then.
