@@ -352,6 +352,12 @@ void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspectio
 
 void Inspector::prepare_topology() {
     if (!sides_) sides_.emplace(surface_);
+    lattice_component_count();
+}
+
+std::optional<std::size_t> Inspector::lattice_component_count() {
+    if (!component_count_) component_count_ = surface_.lattice_component_count();
+    return *component_count_;
 }
 
 void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {

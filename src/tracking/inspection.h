@@ -92,8 +92,11 @@ public:
     std::vector<const CrossingGrid*> reached() const;
     /// Whether some crossings stand for all: the tolerance is several resolutions.
     bool thins_out() const { return crossings_.thinned_out(surface_); }
-    /// What looking at the topology needs of the surface alone; done then if not before.
+    /// What looking at the topology, and then mending it, needs of the surface alone; done then if not
+    /// before.
     void prepare_topology();
+    /// That of the surface, which is counted once.
+    std::optional<std::size_t> lattice_component_count();
     /// The topology of the mesh just inspected. The first time its faults are doubtful places; what more
     /// particles there do not mend then they seldom do.
     void inspect_topology(const FrameMesh& mesh, Inspection& inspection);
@@ -135,6 +138,7 @@ private:
     bool measured_ = false;                 // and kept up to date from then on
     std::vector<std::vector<int>> missed_;  // of each of distances_, ascending
     std::optional<LatticeSides> sides_;
+    std::optional<std::optional<std::size_t>> component_count_;
     bool looked_at_topology_ = false;
 };
 

@@ -20,7 +20,6 @@ namespace {
 constexpr int kMostMendings = 1;
 constexpr double kFew = 0.03;  // of the particles: few enough to be added by certify, without relaxation
 constexpr double kFewFollowing = 0.06;  // likewise where frames before were relaxed, and nothing is fitted
-constexpr double kThick = 3.0, kThickNodes = 6.0;  // tolerances, resolutions: of a solid without thin parts
 constexpr int kCertifyRounds = 24;
 constexpr int kMostTrials = 2;        // rounds of other labels: each takes some meshes
 constexpr int kMostRelabellings = 4;  // what changes sides might go on changing them
@@ -36,12 +35,6 @@ void Tracker::Impl::Making::make_mesh() {
     fitted_.fit_vertices(work_.mesh, particles().size(), work_.surface, tracker_.flips_within(work_.limits));
 }
 
-bool Tracker::Impl::Making::is_thick() const {
-    const double least = std::max(kThick * work_.limits.tolerance, kThickNodes * work_.surface.resolution());
-    const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
-    return std::all_of(thickness.begin(), thickness.end(), [&](double thick) { return thick > least; });
-}
-
 void Tracker::Impl::Making::mesh_particles() {
     Inspector& inspector = *work_.inspector;
     LastMesh& last_mesh = tracker_.last_mesh;
@@ -52,7 +45,7 @@ void Tracker::Impl::Making::mesh_particles() {
             measure_expected = inspector.expect(particles().position, last_mesh.triangles);
         tracker_.tetrahedralise(true, work_.frame.seconds, [&] {
             if (measure_expected) measure_expected();
-            if (!is_thick()) inspector.prepare_topology();
+            if (!tracker_.is_thick(work_)) inspector.prepare_topology();
         });
         // The last mesh is of no more use, and the most memory is needed from now on.
         last_mesh.take({}, particles().size());

@@ -11,9 +11,7 @@ namespace isotrack {
 /// A frame on its way from particles in place to a mesh that passes. All references must outlive it.
 class Tracker::Impl::Making {
 public:
-    Making(Impl& tracker, FrameWork& work) : tracker_(tracker), work_(work) {
-        work.inspector.emplace(work.surface, work.limits, *work.crossings);
-    }
+    Making(Impl& tracker, FrameWork& work) : tracker_(tracker), work_(work) {}
 
     /// Meshes the particles. Once, when many have to be added, their surroundings make room for them: of the
     /// particles of a new sampling, and under a fit, fewer count as many.
@@ -40,10 +38,8 @@ private:
         work_.inspection = {};  // first: there are many errors
         work_.inspection = work_.inspector->inspect_both_ways(work_.mesh);
     }
-    /// Where nothing is thin the nodes of the lattice need not be looked at: the Euler number tells.
-    bool is_thick() const;
     bool has_topology() const {
-        return guided() && is_thick() && work_.surface.lattice_euler() == euler_of(work_.mesh);
+        return guided() && tracker_.is_thick(work_) && work_.surface.lattice_euler() == euler_of(work_.mesh);
     }
     /// Adds particles where the mesh fails. Returns how many; 0 when it passes or nothing more can be done.
     std::size_t mend() {

@@ -130,10 +130,10 @@ std::vector<Vec3> places_everywhere(const FrameMesh& mesh, double resolution) {
 }
 
 /// None where the surface has no lattice.
-std::optional<MeshNumbers> numbers_of_lattice(const Surface& surface) {
+std::optional<MeshNumbers> numbers_of_lattice(const Surface& surface, Inspector& inspector) {
     const auto euler = surface.lattice_euler();
     if (!euler) return std::nullopt;
-    const auto components = surface.lattice_component_count();
+    const auto components = inspector.lattice_component_count();
     if (!components) return std::nullopt;
     return MeshNumbers{static_cast<long>(*components), *euler};
 }
@@ -329,7 +329,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
                            Effort& effort) {
     const double resolution = surface.resolution();
     const std::vector<Vec3> faulty = faulty_places(trials.mesh(), trials.topology(), resolution);
-    const auto of_lattice = numbers_of_lattice(surface);
+    const auto of_lattice = numbers_of_lattice(surface, trials.inspector());
     if (!of_lattice) return 0;
     // Components and handles that are too many or too few.
     const auto astray = [&](const MeshNumbers& numbers) {
@@ -518,7 +518,8 @@ std::size_t patch_failing(MeshTrials& trials, const std::vector<double>& thickne
         if (is_near(v, kAround) && fails_near(v, kAround)) around.push_back(v);
     patch_near(around, kAround, patch_alone);
     if (failing.empty()) return count;
-    if (const auto of_lattice = numbers_of_lattice(surface); of_lattice && numbers == *of_lattice)
+    if (const auto of_lattice = numbers_of_lattice(surface, trials.inspector());
+        of_lattice && numbers == *of_lattice)
         patch_near(places, kApart, patch_twice);
     return count;
 }

@@ -45,8 +45,9 @@ constexpr double kThinned = 0.85;      // of the tolerance: error of triangles t
 constexpr double kUnfitted = 1.3;      // times what a fit leaves of an error
 constexpr int kMostLayers = 4;         // of newborn around those that move
 constexpr double kFewWithError = 0.9;  // of the particles: smooth surfaces have more
-constexpr double kMostSeeded = 0.05;   // of the particles; with more the next frame is half a cold start
-constexpr double kDetail = 2.0;        // tolerances
+constexpr double kThick = 3.0, kThickNodes = 6.0;  // tolerances, resolutions: of a solid without thin parts
+constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
+constexpr double kDetail = 2.0;       // tolerances
 constexpr double kDetailOfEdges = 0.25;
 constexpr double kLeastEdge = 0.5, kLargestEdge = 40.0;  // details
 constexpr double kCrossingsApart = 0.5;  // details: those between are looked at where they may be missed
@@ -225,15 +226,24 @@ void Tracker::Impl::inherit_velocities(const std::vector<Triangle>& triangles) {
     }
 }
 
+bool Tracker::Impl::is_thick(const FrameWork& work) const {
+    const double least = std::max(kThick * work.limits.tolerance, kThickNodes * work.surface.resolution());
+    const std::vector<double>& thickness = last_mesh.evidence.thickness;
+    return std::all_of(thickness.begin(), thickness.end(), [&](double thick) { return thick > least; });
+}
+
 /// Meshes the particles, and measures what the next births and deaths go by.
-void Tracker::Impl::measure(const Surface& surface, const SizingLimits& l, TrackedFrame& frame) {
+void Tracker::Impl::measure(FrameWork& work) {
     constexpr int kSizingSteps = 3;  // barycentric lattice of the samples: with the centroid
-    auto& seconds = frame.seconds;
-    tetrahedralise(true, seconds);
+    const Surface& surface = work.surface;
+    auto& seconds = work.frame.seconds;
+    tetrahedralise(true, seconds, [&] {
+        if (!is_thick(work)) work.inspector->prepare_topology();
+    });
     FrameMesh mesh = carve_mesh(surface, seconds);
     if (options.fit) {
         const StageTimer timer(seconds, "fit");
-        Fitted().fit_vertices(mesh, particles.size(), surface, flips_within(l));
+        Fitted().fit_vertices(mesh, particles.size(), surface, flips_within(work.limits));
     }
     const StageTimer timer(seconds, "size");
     last_mesh.evidence.error = errors_at_particles(
@@ -242,29 +252,29 @@ void Tracker::Impl::measure(const Surface& surface, const SizingLimits& l, Track
 }
 
 /// The first particles, in order.
-void Tracker::Impl::seed(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
-                         double apart, TrackedFrame& frame) {
-    const StageTimer timer(frame.seconds, "cover");
+void Tracker::Impl::seed(FrameWork& work, double apart) {
+    const StageTimer timer(work.frame.seconds, "cover");
     particles = {};
     last_mesh = {};
-    frame.seeded = cover(particles, surface, crossings, l, options.seed, next_id, apart);
+    work.frame.seeded =
+        cover(particles, work.surface, *work.crossings, work.limits, options.seed, next_id, apart);
     arrange();
 }
 
 /// Rounds of: mesh, measure, follow.
-void Tracker::Impl::sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
-                           bool warm, TrackedFrame& frame) {
-    measure(surface, l, frame);
+void Tracker::Impl::sample(FrameWork& work, bool warm) {
+    measure(work);
     // Where flat faces meet nearly all of the mean square is at few particles, and certify adds none for it.
-    const bool dense = options.fit && !warm && share_with_error(last_mesh.evidence, l) < kFewWithError;
+    const bool dense =
+        options.fit && !warm && share_with_error(last_mesh.evidence, work.limits) < kFewWithError;
     if (dense) {
-        seed(surface, crossings, l, kDenseSeeds, frame);
-        measure(surface, l, frame);
+        seed(work, kDenseSeeds);
+        measure(work);
     }
     const int rounds = dense ? kDenseRounds : kRounds;
     for (int round = 0; round < rounds; ++round) {
-        if (round > 0) measure(surface, l, frame);
-        follow(surface, crossings, l, dense ? kDenseAtFirst : kAtFirst, warm, frame);
+        if (round > 0) measure(work);
+        follow(work, dense ? kDenseAtFirst : kAtFirst, warm);
         if (!warm) arrange();
     }
 }
@@ -280,8 +290,10 @@ void Tracker::Impl::make_room(const Surface& surface, TrackedFrame& frame) {
 
 /// Spacing, births and deaths, then sweeps, by what the last mesh knows: no DT is needed. Where particles
 /// were before this frame none goes unless the mesh can do without it, and none moves without need.
-void Tracker::Impl::follow(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
-                           const Pace& pace, bool warm, TrackedFrame& frame) {
+void Tracker::Impl::follow(FrameWork& work, const Pace& pace, bool warm) {
+    const Surface& surface = work.surface;
+    const SizingLimits& l = work.limits;
+    TrackedFrame& frame = work.frame;
     {
         const StageTimer timer(frame.seconds, "size");
         last_mesh.grow(particles.size());
@@ -294,7 +306,7 @@ void Tracker::Impl::follow(const Surface& surface, const CrossingGrid& crossings
     if (warm) {
         return_to_creases(particles, last_mesh.ring, surface);
         const double enough = (options.fit ? kUnfitted : 1.0) * l.tolerance;
-        keep = thin(particles, last_mesh.triangles, surface, crossings,
+        keep = thin(particles, last_mesh.triangles, surface, *work.crossings,
                     {pace.band.crowded, kThinned * enough, kCertified * enough, l.detail});
     } else {
         keep = uncrowded(particles, last_mesh.ring, pace.band);
@@ -364,17 +376,18 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     {
         const StageTimer timer(frame.seconds, "cover");
         work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
+        work.inspector.emplace(surface, l, *work.crossings);
         if (warm) frame.seeded = cover(particles, surface, *work.crossings, l, options.seed, next_id, apart);
     }
-    if (!warm) seed(surface, *work.crossings, l, apart, frame);
+    if (!warm) seed(work, apart);
     work.follows =
         warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size());
     if (options.method == Method::Paper)
         sample_as_in_paper(surface, l, warm, frame);
     else if (work.follows)
-        follow(surface, *work.crossings, l, kFollowing, warm, frame);
+        follow(work, kFollowing, warm);
     else
-        sample(surface, *work.crossings, l, warm, frame);
+        sample(work, warm);
 }
 
 /// Gives the mesh the ids and velocities of its particles.

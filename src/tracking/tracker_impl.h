@@ -72,15 +72,15 @@ struct Tracker::Impl {
     /// of them they rest.
     void inherit_velocities(const std::vector<Triangle>& triangles);
 
-    void follow(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l,
-                const Pace& pace, bool warm, TrackedFrame& frame);
+    /// Where nothing is thin the nodes of the lattice need not be looked at: the Euler number tells.
+    bool is_thick(const FrameWork& work) const;
+
+    void follow(FrameWork& work, const Pace& pace, bool warm);
     std::vector<char> restless(double detail) const;
     void make_room(const Surface& surface, TrackedFrame& frame);
-    void measure(const Surface& surface, const SizingLimits& l, TrackedFrame& frame);
-    void seed(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, double apart,
-              TrackedFrame& frame);
-    void sample(const Surface& surface, const CrossingGrid& crossings, const SizingLimits& l, bool warm,
-                TrackedFrame& frame);
+    void measure(FrameWork& work);
+    void seed(FrameWork& work, double apart);
+    void sample(FrameWork& work, bool warm);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     void place_particles(const Motion& motion, FrameWork& work);
     void name_vertices(const FrameMesh& mesh, TriangleMesh& named);
