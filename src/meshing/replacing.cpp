@@ -42,18 +42,25 @@ Replaced ReplaceableMesh::replaced(std::vector<int> numbers, std::vector<int> be
 
 bool ReplaceableMesh::may_have(const std::vector<Places>& candidates, const Replaced& before,
                                Surface::Probe& probe) const {
-    if (!(facing_of(candidates, probe) > std::min(kFacing, before.facing))) return false;
+    // What costs least and fails most comes first.
+    const double least_facing = std::min(kFacing, before.facing);
+    const auto faces = [&](const Places& t) {
+        const auto& [a, b, c] = t;
+        return facing(a, b, c, probe) > least_facing;
+    };
+    if (!std::all_of(candidates.begin(), candidates.end(), faces)) return false;
+    std::vector<FacingTriangle> after;
+    for (const auto& [a, b, c] : candidates) after.emplace_back(a, b, c);
+    const auto stand_there = [&](const CrossingGrid* points_there) {
+        return stand_for_same(*points_there, before.triangles, before.box, after, before.beside, tolerance);
+    };
+    if (!std::all_of(reached.begin(), reached.end(), stand_there)) return false;
     const auto passes = [&](const Places& t) {
         const auto& [a, b, c] = t;
         const TriangleError error = certified_error(a, b, c, probe, detail, 0.5 * tolerance, tolerance);
         return error.largest <= tolerance && error.turned_deg <= kMostTurnedDeg;
     };
-    if (!std::all_of(candidates.begin(), candidates.end(), passes)) return false;
-    std::vector<FacingTriangle> after;
-    for (const auto& [a, b, c] : candidates) after.emplace_back(a, b, c);
-    return std::all_of(reached.begin(), reached.end(), [&](const CrossingGrid* points_there) {
-        return stand_for_same(*points_there, before.triangles, before.box, after, before.beside, tolerance);
-    });
+    return std::all_of(candidates.begin(), candidates.end(), passes);
 }
 
 }  // namespace isotrack
