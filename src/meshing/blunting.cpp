@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "find_in_blocks.h"
 #include "meshing/crossing_triangles.h"
 #include "meshing/sharpness.h"
 #include "parallel_for_each.h"
@@ -150,13 +151,16 @@ bool Blunter::run(int passes) {
 }
 
 bool Blunter::pass() {
-    std::vector<Sharp> sharp;
-    for (std::size_t t = 0; t < triangles_.size(); ++t) {
-        const auto& [i, j, k] = triangles_[t];
-        if (!open_[i] && !open_[j] && !open_[k]) continue;
-        if (const double s = sharpness(points_[i], points_[j], points_[k]); s > kSharpnessAt30Degrees)
-            sharp.emplace_back(-s, static_cast<int>(t));
-    }
+    constexpr std::size_t kBlock = 4096;
+    auto sharp = find_in_blocks<Sharp>(
+        triangles_.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<Sharp>& found) {
+            for (std::size_t t = begin; t < end; ++t) {
+                const auto& [i, j, k] = triangles_[t];
+                if (!open_[i] && !open_[j] && !open_[k]) continue;
+                if (const double s = sharpness(points_[i], points_[j], points_[k]); s > kSharpnessAt30Degrees)
+                    found.emplace_back(-s, static_cast<int>(t));
+            }
+        });
     open_.assign(points_.size(), 0);
     if (sharp.empty()) return false;
     std::sort(sharp.begin(), sharp.end());

@@ -8,7 +8,7 @@
 namespace isotrack {
 
 /// Flags for the triangles that cross others, by `self_intersections`; at least one of each pair is `fresh`.
-/// The cost goes with those that are near a fresh one.
+/// The cost goes with those that are near a fresh one. Uses TBB inside.
 std::vector<char> crossing_triangles(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                                      const std::vector<char>& fresh);
 

@@ -383,11 +383,18 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
                                 const Particles& particles, const Surface& surface,
                                 const SizingLimits& limits) {
     std::vector<Shortage> result;
-    const auto probe = surface.probe();
+    ThreadProbes probes(surface);
     const CarvedSurface& carved = mesh.carved;
     struct Failing {
         std::size_t triangle;
         std::optional<Shortage> at_crease;  // alone
+        std::optional<Vec3> dual;           // in the middle of its ball
+    };
+    const auto dual_of = [&](std::size_t t, bool whole) {
+        return whole && carved.inside_cell(t) >= 0
+                   ? dual_crossing(cells, particles.position, carved.inside_cell(t), carved.inside_facet(t),
+                                   probes.local())
+                   : std::nullopt;
     };
     const auto find_failing = [&](std::size_t begin, std::size_t end, std::vector<Failing>& found) {
         for (std::size_t t = begin; t < end; ++t) {
@@ -399,31 +406,26 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             if (is_too_far(error, limits.tolerance) || is_turned(error) ||
                 (whole && is_needle(particles, corner, limits.detail)) ||
                 (is_sharp && angles_matter(particles, corner, limits.detail)))
-                found.push_back({t, std::nullopt});
+                found.push_back({t, std::nullopt, dual_of(t, whole)});
             else if (is_sharp)
                 if (auto at_crease = crease_shortage(mesh, particles, t, corner, limits.detail))
-                    found.push_back({t, at_crease});
+                    found.push_back({t, at_crease, std::nullopt});
         }
     };
     constexpr std::size_t kTrianglesPerBlock = 1024;
-    for (const auto& [t, at_crease] :
+    for (const auto& [t, at_crease, dual] :
          find_in_blocks<Failing>(inspection.errors->size(), kTrianglesPerBlock, find_failing)) {
         if (at_crease) {
             result.push_back(*at_crease);
             continue;
         }
-        const auto [corner, whole] = corners_of(carved, t);
-        const auto x = whole && carved.inside_cell(t) >= 0
-                           ? dual_crossing(cells, particles.position, carved.inside_cell(t),
-                                           carved.inside_facet(t), *probe)
-                           : std::nullopt;
-        if (x) {  // in the middle of the facet's ball, whose corners a flip may have exchanged
+        if (dual) {  // whose corners a flip may have exchanged
             const int on_ball =
                 cells.vertices[carved.inside_cell(t)][Tetrahedra::kFacet[carved.inside_facet(t)][0]];
-            result.push_back({*x, (*x - particles.position[on_ball]).norm()});
+            result.push_back({*dual, (*dual - particles.position[on_ball]).norm()});
         } else if (is_too_far((*inspection.errors)[t], limits.tolerance) || is_flipped(carved, t, cells)) {
             double h = limits.max_edge;
-            for (const int p : corner)
+            for (const int p : corners_of(carved, t).particle)
                 if (p >= 0) h = std::min(h, particles.spacing[p]);
             result.push_back({(*inspection.errors)[t].where.cast<double>(), 0.7 * h});
         }
