@@ -1,7 +1,11 @@
 // What one mesh of a frame has in common with the next: only facets near insertions come and go.
 #pragma once
 
+#include <tbb/parallel_for.h>
+
 #include <array>
+#include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "isotrack/meshing/manifold.h"
@@ -58,21 +62,61 @@ private:
     std::vector<Eigen::Vector3f> place_;  // of each vertex
 };
 
-/// Calls `same` with the numbers of each facet that is in both, in `now` and in `before`; `came` with those
-/// only in `now`, and what they are, `went` with those only in `before`. Of anything with a `facet_key`: both
-/// ascend by it but for those that have -1, which must equal nothing.
-template <typename Now, typename Before, typename Same, typename Came, typename Went>
-void compare(const Now& now, const Before& before, const Same& same, const Came& came, const Went& went) {
-    std::size_t old = 0;
-    for (std::size_t f = 0; f < now.size(); ++f) {
-        const auto facet = now[f];
-        while (facet.key >= 0 && old < before.size() && before[old].key < facet.key) went(old++);
-        if (old < before.size() && facet == before[old])
-            same(f, old++);
-        else
-            came(f, facet);
+/// What is in one of two meshes alone: numbers, ascending.
+struct FacetDifference {
+    std::vector<std::size_t> came, went;
+};
+
+/// Calls `same` with the numbers of each facet that is in both, in `now` and in `before`, from several
+/// threads. Of anything with a `facet_key`: both ascend by it but for those that have -1, which must equal
+/// nothing.
+template <typename Now, typename Before, typename Same>
+FacetDifference compare(const Now& now, const Before& before, const Same& same) {
+    constexpr std::size_t kBlock = 4096;
+    /// A place in `before` ahead of which all keys are lower than this one, and behind which none is.
+    const auto place_of = [&](int key) {
+        std::size_t low = 0, high = before.size();
+        while (low < high) {
+            const std::size_t middle = low + (high - low) / 2;
+            std::size_t keyed = middle;
+            while (keyed < high && before[keyed].key < 0) ++keyed;
+            if (keyed < high && before[keyed].key < key)
+                low = keyed + 1;
+            else
+                high = middle;
+        }
+        return low;
+    };
+    struct Start {
+        std::size_t now, before;
+    };
+    std::vector<Start> starts{{0, 0}};  // of blocks, and the end
+    for (std::size_t f = kBlock; f < now.size(); f += kBlock) {
+        while (f < now.size() && now[f].key < 0) ++f;
+        if (f < now.size()) starts.push_back({f, place_of(now[f].key)});
     }
-    while (old < before.size()) went(old++);
+    std::vector<FacetDifference> blocks(starts.size());
+    starts.push_back({now.size(), before.size()});
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+        const Start end = starts[b + 1];
+        auto& [came, went] = blocks[b];
+        std::size_t old = starts[b].before;
+        for (std::size_t f = starts[b].now; f < end.now; ++f) {
+            const auto facet = now[f];
+            while (facet.key >= 0 && old < end.before && before[old].key < facet.key) went.push_back(old++);
+            if (old < end.before && facet == before[old])
+                same(f, old++);
+            else
+                came.push_back(f);
+        }
+        while (old < end.before) went.push_back(old++);
+    });
+    FacetDifference result = std::move(blocks.front());
+    for (std::size_t b = 1; b < blocks.size(); ++b) {
+        result.came.insert(result.came.end(), blocks[b].came.begin(), blocks[b].came.end());
+        result.went.insert(result.went.end(), blocks[b].went.begin(), blocks[b].went.end());
+    }
+    return result;
 }
 
 /// Of what came and went, which have no key, those that are the same after all, by their corners: pairs of

@@ -40,21 +40,15 @@ void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface&
     }
     std::vector<char> movable(mesh.vertices.size(), 0);
     std::vector<int> now(facets_.size(), -1);
-    std::size_t known = 0;
-    compare(
-        facets, facets_,
-        [&](std::size_t f, std::size_t old) {
-            now[old] = static_cast<int>(f);
-            ++known;
-        },
-        [&](std::size_t f, const FacetOfParticles&) {
-            for (const int v : triangles[f]) movable[v] = 1;
-        },
-        [](std::size_t) {});
+    const std::vector<std::size_t> came = compare(facets, facets_, [&](std::size_t f, std::size_t old) {
+                                              now[old] = static_cast<int>(f);
+                                          }).came;
+    for (const std::size_t f : came)
+        for (const int v : triangles[f]) movable[v] = 1;
     facets_ = std::move(facets);
     const std::vector<int> vertex = lone_vertices(mesh, particles);
     const std::vector<char> lone = lone_flags(mesh, vertex);
-    const bool is_first = 2 * known < triangles.size();
+    const bool is_first = 2 * came.size() > triangles.size();
     if (is_first) {
         flips_ = {};
         movable.assign(movable.size(), 1);

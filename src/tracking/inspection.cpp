@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <utility>
 
 #include "find_in_blocks.h"
+#include "parallel_for_each.h"
 #include "sampling/compact.h"
 #include "surface/lattice_scan.h"
 #include "surface/surface_near.h"
@@ -145,39 +147,39 @@ std::vector<FacetError> Inspector::errors_of(const std::vector<Vec3>& corners) c
 
 std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& result,
                                             FacetChanges& changes) {
-    constexpr std::size_t kSame = ~std::size_t{0};
+    constexpr std::size_t kSame = ~std::size_t{0}, kGrain = 1024;
     const MeshFacets facets(mesh.carved, mesh.vertices);
     std::vector<const FacetError*> known(facets.size(), nullptr);
     std::vector<char> seen(facets.size(), 0);  // in the mesh before
     // Where all triangles keep their numbers, as when a mesh is made blunter, and nobody else holds the
     // errors before, these go to their places: another thread's heap need not grow for them.
-    bool in_place = errors_.use_count() == 1 && errors_->size() == facets.size();
+    std::atomic<bool> in_place = errors_.use_count() == 1 && errors_->size() == facets.size();
     const auto take_same = [&](std::size_t f, std::size_t old) {
         known[f] = &(*errors_)[old];
         seen[f] = 1;
-        in_place = in_place && f == old;
+        if (f != old && in_place) in_place = false;
     };
     struct Unkeyed {
         std::vector<std::size_t> number;
         std::vector<Facet> facet;
-        void add(std::size_t n, const Facet& f) {
-            number.push_back(n);
-            facet.push_back(f);
+    };
+    const FacetDifference differ = compare(facets, facets_, take_same);
+    const auto unkeyed_of = [&](const std::vector<std::size_t>& numbers, const auto& all,
+                                std::vector<Facet>& changed) {
+        Unkeyed unkeyed;
+        for (const std::size_t n : numbers) {
+            const Facet facet = all[n];
+            if (facet.key < 0) {
+                unkeyed.number.push_back(n);
+                unkeyed.facet.push_back(facet);
+            } else if (measured_) {
+                changed.push_back(facet);
+            }
         }
-    } came, went;
-    compare(
-        facets, facets_, take_same,
-        [&](std::size_t f, const Facet& facet) {
-            if (facet.key < 0) return came.add(f, facet);
-            if (measured_) changes.came.push_back(facet);
-            const auto [corner, whole] = corners_of(mesh.carved, f);
-            const int e = expected_ && whole ? expected_->triangles.find(corner) : -1;
-            if (e >= 0) known[f] = &expected_->errors[e];
-        },
-        [&](std::size_t old) {
-            if (facets_[old].key < 0) return went.add(old, facets_[old]);
-            if (measured_) changes.went.push_back(facets_[old]);
-        });
+        return unkeyed;
+    };
+    Unkeyed came = unkeyed_of(differ.came, facets, changes.came),
+            went = unkeyed_of(differ.went, facets_, changes.went);
     for (const auto& [c, w] : same_corners(came.facet, went.facet)) {
         take_same(came.number[c], went.number[w]);
         came.number[c] = went.number[w] = kSame;
@@ -191,6 +193,13 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
     if (!in_place) facets_ = {};  // of no more use
     changes.many = static_cast<double>(std::max(changes.came.size(), changes.went.size())) >
                    kMany * static_cast<double>(facets.size());
+    if (expected_)
+        parallel_for_each(facets.size(), kGrain, [&](std::size_t f) {
+            if (known[f]) return;
+            const auto [corner, whole] = corners_of(mesh.carved, f);
+            const int e = whole ? expected_->triangles.find(corner) : -1;
+            if (e >= 0) known[f] = &expected_->errors[e];
+        });
     std::vector<Triangle> fresh;
     for (std::size_t f = 0; f < facets.size(); ++f)
         if (!known[f]) fresh.push_back(from_least_corner(mesh.carved.triangles[f]));
@@ -200,11 +209,9 @@ std::vector<Vec3> Inspector::measure_errors(const FrameMesh& mesh, Inspection& r
         if (!error) error = &*next++;
     const auto measured = in_place ? errors_ : std::make_shared<std::vector<FacetError>>(facets.size());
     std::vector<char> too_far(facets.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, facets.size(), 1024), [&](const auto& range) {
-        for (std::size_t f = range.begin(); f < range.end(); ++f) {
-            (*measured)[f] = *known[f];
-            too_far[f] = is_too_far(*known[f], limits_.tolerance);
-        }
+    parallel_for_each(facets.size(), kGrain, [&](std::size_t f) {
+        (*measured)[f] = *known[f];
+        too_far[f] = is_too_far(*known[f], limits_.tolerance);
     });
     std::vector<Vec3> in_vain;
     const auto probe = surface_.probe();

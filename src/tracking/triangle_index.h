@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <numeric>
 #include <vector>
 
 #include "isotrack/types.h"
@@ -19,11 +21,16 @@ class TriangleIndex {
 public:
     TriangleIndex() = default;
     TriangleIndex(std::size_t vertices, const std::vector<Triangle>& triangles)
-        : first_(vertices + 1, 0), triangles_(triangles) {
-        for (Triangle& t : triangles_) t = from_least_corner(t);
-        std::sort(triangles_.begin(), triangles_.end());
-        for (const Triangle& t : triangles_) ++first_[t[0] + 1];
-        for (std::size_t v = 0; v < vertices; ++v) first_[v + 1] += first_[v];
+        : first_(vertices + 1, 0), triangles_(triangles.size()) {
+        for (const Triangle& t : triangles) ++first_[*std::min_element(t.begin(), t.end()) + 1];
+        std::partial_sum(first_.begin(), first_.end(), first_.begin());
+        std::vector<int> next(first_.begin(), first_.end() - 1);
+        for (const Triangle& corners : triangles) {
+            const Triangle t = from_least_corner(corners);
+            triangles_[next[t[0]]++] = t;
+        }
+        for (std::size_t v = 0; v < vertices; ++v)
+            std::sort(triangles_.begin() + first_[v], triangles_.begin() + first_[v + 1]);
     }
     /// From their least corners on, ascending.
     const std::vector<Triangle>& triangles() const { return triangles_; }
