@@ -7,6 +7,7 @@
 
 #include "find_in_blocks.h"
 #include "meshing/triangle_box.h"
+#include "meshing/triangle_distance.h"
 #include "parallel_for_each.h"
 #include "tracking/failing.h"
 
@@ -21,6 +22,7 @@ constexpr double kFarther = 0.1, kFartherAtFolds = 0.45;  // the latter where so
 // inner side the middle between two crossings, each near a triangle of its own, is up to half the way between
 // them times that farther off. Some ways are longer than a spacing; that misses no more was measured.
 constexpr double kFartherBetween = 0.5;
+constexpr double kNearFold = 2.0;  // spacings: what is looked at beside a crossing is nearer to it
 // Spacings: so far around lie those that a crossing stands for.
 constexpr double kStandsForWithin = 0.5, kStandsForOnFlat = 2.0;
 constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
@@ -54,6 +56,25 @@ std::vector<float> turns_at_vertices(const std::vector<Vec3>& vertices,
     return result;
 }
 
+/// The folds at a triangle: along an edge where both ends turn, or at one end alone.
+struct Folds {
+    std::array<Vec3, 3> corner;
+    std::array<double, 3> turn;  // at each
+
+    /// The sharpest that comes near a place, by a squared distance; 0: none.
+    double turn_near(const Vec3& p, double near2) const {
+        double result = 0.0;
+        for (int k = 0; k < 3; ++k) {
+            const int next = (k + 1) % 3;
+            const double sharper = std::max(turn[k], turn[next]);
+            if (!(sharper > result)) continue;
+            const Vec3 &from = corner[turn[k] > 0.0 ? k : next], &to = corner[turn[next] > 0.0 ? next : k];
+            if (squared_distance(p, from, to, to) < near2) result = sharper;
+        }
+        return result;
+    }
+};
+
 Box box_along(const Triangle& t, const std::vector<Vec3>& vertices, double distance) {
     const Box box = box_of(vertices, t);
     const Vec3 reach = Vec3::Constant(distance);
@@ -81,16 +102,21 @@ std::vector<char> flags_at(const std::vector<Eigen::Vector3f>& places, const std
 void BetweenCrossings::flag_at_folds(const std::vector<Triangle>& triangles, const std::vector<float>& turns,
                                      const std::vector<Vec3>& vertices, const MeshDistances& at_crossings,
                                      Flags& at_fold) const {
-    const double spacing = crossings_.spacing();
+    const double spacing = crossings_.spacing(), near2 = kNearFold * spacing * kNearFold * spacing;
     const bool thinned_out = crossings_.thinned_out(surface_);
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         const auto& [i, j, k] = triangles[t];
-        const double turn = std::max({turns[i], turns[j], turns[k]});
-        if (turn == 0.0) return;
-        const double farther = thinned_out ? kFartherAtFolds : kFartherBetween * turn,
-                     nearly = std::max(kNearlyAtFolds * tolerance_, tolerance_ - farther * spacing);
+        const Folds folds{{vertices[i], vertices[j], vertices[k]}, {turns[i], turns[j], turns[k]}};
+        const double sharpest = *std::max_element(folds.turn.begin(), folds.turn.end());
+        if (sharpest == 0.0) return;
+        const auto is_nearly_too_far = [&](std::size_t c, double turn) {
+            const double farther = thinned_out ? kFartherAtFolds : kFartherBetween * turn;
+            return at_crossings[c] > std::max(kNearlyAtFolds * tolerance_, tolerance_ - farther * spacing);
+        };
         crossings_.for_each_in(box_along(triangles[t], vertices, tolerance_), [&](std::size_t c) {
-            if (at_crossings[c] > nearly) at_fold[c].store(1, std::memory_order_relaxed);
+            if (at_fold[c].load(std::memory_order_relaxed) || !is_nearly_too_far(c, sharpest)) return;
+            if (thinned_out || is_nearly_too_far(c, folds.turn_near(crossings_[c].point, near2)))
+                at_fold[c].store(1, std::memory_order_relaxed);
         });
     });
 }

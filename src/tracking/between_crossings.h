@@ -21,9 +21,9 @@ public:
           tolerance_(tolerance),
           cells_(surface, crossings, diagonals) {}
 
-    /// Points of the surface beside crossings that the mesh only just reaches: at its folds, the sharper the
-    /// sooner, those with up to half a spacing of the crossings to spare, since from a fold what lies between
-    /// two crossings may be much farther than either, but fewer where the surface is flat. Where some
+    /// Points of the surface beside crossings that the mesh only just reaches: near its folds, the sharper
+    /// the sooner, those with up to half a spacing of the crossings to spare, since from a fold what lies
+    /// between two crossings may be much farther than either, but fewer where the surface is flat. Where some
     /// crossings stand for others: those others, with no direction: a triangle may stand for them whichever
     /// way it faces. Else points in cells, of those with an ambiguous face in all. What was returned before
     /// is left out.

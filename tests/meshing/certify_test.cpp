@@ -56,6 +56,16 @@ TEST_F(TwoBumps, AreToldApartWhereValuesChangeSteeply) {
     EXPECT_LT((found(1.0, 0.7).where - narrow).norm(), 0.05);
 }
 
+TEST_F(TwoBumps, AreLookedAtNoCloserWhereThePointsAreTooMuch) {
+    const auto found_up_to = [&](double too_much) {
+        return certified_error(points[0], points[1], points[2], *bumps(0.2)->probe(), 1.0, 0.1, too_much)
+            .largest;
+    };
+    EXPECT_NEAR(found_up_to(0.15), 0.16, 1e-3);             // of the points
+    EXPECT_EQ(found_up_to(0.17), found(0.2, 0.1).largest);  // beyond it, but not at the points
+    EXPECT_EQ(found_up_to(0.19), found(0.2, 0.1).largest);
+}
+
 /// Counts what it is asked.
 class CountingProbe final : public Surface::Probe {
 public:

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 #include <set>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "isotrack/surface/level_set.h"
 #include "isotrack/surface/rasterise.h"
 #include "isotrack/surface/shapes.h"
+#include "meshing/triangle_distance.h"
 #include "support/carved.h"
 #include "surface/cell_points.h"
 #include "surface/float_precision.h"
@@ -75,6 +77,50 @@ struct InspectorOfABox : ::testing::Test {
         p = to_float_precision(p * (1.0 - 0.05 / p.norm()));
     }
 };
+
+TEST_F(InspectorOfABox, LooksBetweenCrossingsNearFoldsAlone) {
+    // A mesh of twelve triangles, nowhere so far off that it is looked at for that.
+    constexpr double kTolerance = 0.5 * kResolution, kOff = 0.7 * kTolerance;
+    const Vec3 middle(0.01, 0.02, 0.03), half(1.0, 0.7, 0.45);
+    std::vector<Vec3> vertices;
+    for (int k = 0; k < 8; ++k)
+        vertices.push_back(
+            middle +
+            ((half.array() - kOff) * (2.0 * Eigen::Array3d(k & 1, k >> 1 & 1, k >> 2) - 1.0)).matrix());
+    std::vector<Triangle> triangles;
+    for (int axis = 0; axis < 3; ++axis)
+        for (const int side : {0, 1}) {
+            const int low = side << axis, u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3;
+            const int a = low, b = low + (side == 1 ? u : v), c = low + u + v, d = low + (side == 1 ? v : u);
+            triangles.insert(triangles.end(), {{a, b, c}, {a, c, d}});
+        }
+    MeshDistances distances(crossings, 3.0 * kTolerance);
+    distances.measure(vertices, triangles, {});
+    for (std::size_t c = 0; c < crossings.size(); ++c) ASSERT_NEAR(distances[c], kOff, 0.3 * kOff);
+    BetweenCrossings between(*box, crossings, {}, kTolerance);
+    const PackedCrossings points = between.points(vertices, triangles, distances);
+    // All its edges have ends that turn.
+    const auto from_edge = [&](const Vec3& p) {
+        double least = 1.0;
+        for (const Triangle& t : triangles)
+            for (int k = 0; k < 3; ++k) {
+                const Vec3 &from = vertices[t[k]], &to = vertices[t[(k + 1) % 3]];
+                least = std::min(least, std::sqrt(squared_distance(p, from, to, to)));
+            }
+        return least;
+    };
+    std::vector<int> all(crossings.size());
+    std::iota(all.begin(), all.end(), 0);
+    const PackedCrossings cells = CellPoints(*box, crossings, {}).around(all);
+    const auto count_near = [&](const PackedCrossings& some, double distance) {
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < some.size(); ++i) count += from_edge(some.point(i)) < distance;
+        return count;
+    };
+    EXPECT_EQ(count_near(points, kResolution), count_near(cells, kResolution));
+    EXPECT_GT(points.size(), 300u);
+    EXPECT_EQ(count_near(points, 4.0 * kResolution), points.size());
+}
 
 TEST_F(InspectorOfABox, FindsTheSameBetweenCrossingsByWhatChanged) {
     const auto& triangles = mesh.carved.triangles;
@@ -226,19 +272,6 @@ TEST(Inspector, LetsAnyTriangleStandForWhatACrossingStandsFor) {
     const auto as_they_are = crossing_distances(mesh.vertices, mesh.carved.triangles, points, kCutoff),
                turned_over = crossing_distances(mesh.vertices, turned, points, kCutoff);
     for (std::size_t i = 0; i < points.size(); ++i) EXPECT_NEAR(as_they_are[i], turned_over[i], 1e-6);
-}
-
-TEST(Facets, AreTheSameByTheirCornersWhereTheyHaveNoKey) {
-    const auto facet = [](float x) {
-        return Facet{-1, {Eigen::Vector3f(x, 0, 0), Eigen::Vector3f(x, 1, 0), Eigen::Vector3f(x, 0, 1)}};
-    };
-    const std::vector<Facet> came = {facet(4), facet(1), facet(3)},
-                             went = {facet(2), facet(3), facet(4), facet(5)};
-    auto same = same_corners(came, went);
-    std::sort(same.begin(), same.end());
-    const std::vector<std::array<std::size_t, 2>> expected = {{0, 2}, {2, 1}};
-    EXPECT_EQ(same, expected);
-    EXPECT_TRUE(same_corners(came, {}).empty());
 }
 
 }  // namespace
