@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <iterator>
 
 #include "find_in_blocks.h"
 #include "meshing/triangle_box.h"
@@ -27,7 +28,7 @@ constexpr double kNearFold = 2.0;  // spacings: what is looked at beside a cross
 constexpr double kStandsForWithin = 0.5, kStandsForOnFlat = 2.0;
 constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
 
-constexpr std::size_t kGrain = 1024;
+constexpr std::size_t kGrain = 1024, kBlock = 32768;
 
 /// For each vertex the sine of the largest angle between the normal of a triangle there and its own, 0 where
 /// they meet nearly flat.
@@ -79,6 +80,10 @@ Box box_along(const Triangle& t, const std::vector<Vec3>& vertices, double dista
     const Box box = box_of(vertices, t);
     const Vec3 reach = Vec3::Constant(distance);
     return Box(box.min() - reach, box.max() + reach);
+}
+
+bool has_any(const Triangle& t, const std::vector<char>& flagged) {
+    return flagged[t[0]] || flagged[t[1]] || flagged[t[2]];
 }
 
 /// Flags for the vertices that are at some places, which floats hold.
@@ -156,7 +161,6 @@ PackedCrossings BetweenCrossings::points(const std::vector<Vec3>& vertices,
     Flags at_fold(crossings_.size());
     flag_at_folds(triangles, turns_at_vertices(vertices, triangles), vertices, at_crossings, at_fold);
     looked_at_.resize(crossings_.size(), 0);
-    constexpr std::size_t kBlock = 32768;
     return points_beside(find_in_blocks<int>(
         crossings_.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
             for (std::size_t c = begin; c < end; ++c)
@@ -171,15 +175,19 @@ PackedCrossings BetweenCrossings::points_near(const Changes& changes, const std:
     // those along the triangles there, which may be at a fold now.
     std::vector<int> near;
     {
-        std::vector<char> is_near(crossings_.size(), 0);
-        for (const int c : changes.crossings) is_near[c] = 1;
+        Flags is_near(crossings_.size());
+        const auto flag = [&](std::size_t c) { is_near[c].store(1, std::memory_order_relaxed); };
+        for (const int c : changes.crossings) flag(c);
         const std::vector<char> turned = flags_at(changes.corners, vertices);
-        for (const Triangle& t : triangles)
-            if (turned[t[0]] || turned[t[1]] || turned[t[2]])
-                crossings_.for_each_in(box_along(t, vertices, tolerance_),
-                                       [&](std::size_t c) { is_near[c] = 1; });
-        for (std::size_t c = 0; c < is_near.size(); ++c)
-            if (is_near[c]) near.push_back(static_cast<int>(c));
+        parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
+            if (has_any(triangles[t], turned))
+                crossings_.for_each_in(box_along(triangles[t], vertices, tolerance_), flag);
+        });
+        near = find_in_blocks<int>(crossings_.size(), kBlock,
+                                   [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
+                                       for (std::size_t c = begin; c < end; ++c)
+                                           if (is_near[c]) found.push_back(static_cast<int>(c));
+                                   });
     }
     const CrossingGrid near_alone = crossings_.some(near);
     std::vector<char> beside(triangles.size(), 0), at(vertices.size(), 0);
@@ -187,14 +195,18 @@ PackedCrossings BetweenCrossings::points_near(const Changes& changes, const std:
         near_alone.for_each_in(box_along(triangles[t], vertices, tolerance_),
                                [&](std::size_t) { beside[t] = 1; });
     });
-    std::vector<Triangle> some, around;
+    std::vector<Triangle> some;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         if (!beside[t]) continue;
         some.push_back(triangles[t]);
         for (const int v : triangles[t]) at[v] = 1;
     }
-    for (const Triangle& t : triangles)
-        if (at[t[0]] || at[t[1]] || at[t[2]]) around.push_back(t);
+    const auto around = find_in_blocks<Triangle>(
+        triangles.size(), 4 * kGrain, [&](std::size_t begin, std::size_t end, std::vector<Triangle>& found) {
+            std::copy_if(triangles.begin() + static_cast<std::ptrdiff_t>(begin),
+                         triangles.begin() + static_cast<std::ptrdiff_t>(end), std::back_inserter(found),
+                         [&](const Triangle& t) { return has_any(t, at); });
+        });
     Flags at_fold(crossings_.size());
     flag_at_folds(some, turns_at_vertices(vertices, around), vertices, at_crossings, at_fold);
     std::vector<int> doubtful;
