@@ -172,8 +172,9 @@ TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surfa
     auto [error, steepest] = survey(a, b, c, probe, steps, refine_above, too_much);
     if (error.largest > too_much) return error;
     if (steps < kMostSteps && (error.largest > kAlmost * refine_above || steepest > kSteep)) {
-        const TriangleError again = triangle_error(a, b, c, probe, kMostSteps, refine_above);
+        const TriangleError again = survey(a, b, c, probe, kMostSteps, refine_above, too_much).error;
         if (again.largest > error.largest) error = again;
+        if (error.largest > too_much) return error;
     }
     error.turned_deg = turned_deg(a, b, c, probe, detail);
     return error;

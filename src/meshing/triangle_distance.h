@@ -1,4 +1,4 @@
-// How far a point is from a triangle.
+// How far a point is from a triangle or a segment.
 #pragma once
 
 #include <algorithm>
@@ -6,6 +6,14 @@
 #include "isotrack/types.h"
 
 namespace isotrack {
+
+/// Squared distance from p to segment ab.
+inline double squared_distance(const Vec3& p, const Vec3& a, const Vec3& b) {
+    const Vec3 ab = b - a, ap = p - a;
+    const double length2 = ab.squaredNorm();
+    const double t = length2 > 0.0 ? std::clamp(ap.dot(ab) / length2, 0.0, 1.0) : 0.0;
+    return (ap - t * ab).squaredNorm();
+}
 
 /// Squared distance from p to triangle abc [Ericson 2005, "Real-Time Collision Detection", 5.1.5].
 inline double squared_distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {

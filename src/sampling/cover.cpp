@@ -43,29 +43,29 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
     const double spacing = grid.spacing();
     std::vector<std::atomic<char>> covered(grid.size());  // marked by several threads
     /// What a particle covers. `else_reach`: where the surface is not flat.
-    struct Patch {
+    struct Disc {
         Vec3 p, n;
         double reach, else_reach;
     };
-    const auto patch_of = [&](const Vec3& p, const Vec3& n, double reach, double else_reach) -> Patch {
+    const auto disc_of = [&](const Vec3& p, const Vec3& n, double reach, double else_reach) -> Disc {
         // A crossing lies within a cell's diagonal of its neighbours.
         return {p, n, std::max(reach, 1.2 * spacing), std::max(else_reach, 1.2 * spacing)};
     };
-    const auto covers = [&](const Patch& patch, const Surface::Crossing& crossing) {
-        const Vec3 way = crossing.point - patch.p;
-        const double near = crossing.flat ? patch.reach : patch.else_reach;
+    const auto covers = [&](const Disc& disc, const Surface::Crossing& crossing) {
+        const Vec3 way = crossing.point - disc.p;
+        const double near = crossing.flat ? disc.reach : disc.else_reach;
         if (way.squaredNorm() > near * near ||
-            std::abs(patch.n.dot(way)) >= std::max(kOffPlane * near, 0.5 * spacing))
+            std::abs(disc.n.dot(way)) >= std::max(kOffPlane * near, 0.5 * spacing))
             return false;
-        const double facing = patch.n.dot(crossing.outward.cast<double>());
+        const double facing = disc.n.dot(crossing.outward.cast<double>());
         return facing > kRounding ||
                (facing > -kGrazing && way.squaredNorm() < kHere * spacing * kHere * spacing);
     };
     // Of `some` of the crossings, which have these numbers.
-    const auto mark = [&](const CrossingGrid& some, const auto& number, const Patch& patch) {
-        const Vec3 reach = Vec3::Constant(patch.reach);
-        some.for_each_in(Box(patch.p - reach, patch.p + reach), [&](std::size_t c) {
-            if (!covered[number(c)].load(std::memory_order_relaxed) && covers(patch, some[c]))
+    const auto mark = [&](const CrossingGrid& some, const auto& number, const Disc& disc) {
+        const Vec3 reach = Vec3::Constant(disc.reach);
+        some.for_each_in(Box(disc.p - reach, disc.p + reach), [&](std::size_t c) {
+            if (!covered[number(c)].load(std::memory_order_relaxed) && covers(disc, some[c]))
                 covered[number(c)].store(1, std::memory_order_relaxed);
         });
     };
@@ -74,7 +74,7 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
         constexpr std::size_t kParticles = 64;  // a thread's at least
         parallel_for_each(particles.size(), kParticles, [&](std::size_t i) {
             const double reach = share * particles.spacing[i];
-            mark(some, number, patch_of(particles.position[i], particles.normal[i], reach, reach));
+            mark(some, number, disc_of(particles.position[i], particles.normal[i], reach, reach));
         });
     };
     if (particles.size() > 0) {
@@ -123,17 +123,17 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
                 Surface::Probe& probe = probes.local();
                 for (std::size_t i = range.begin(); i < range.end(); ++i) seeds[i] = seed_at(batch[i], probe);
             });
-            std::vector<Patch> sown;
+            std::vector<Disc> sown;
             for (std::size_t i = 0; i < batch.size(); ++i) {
                 const Surface::Crossing crossing = grid[batch[i]];
                 if (std::any_of(sown.begin(), sown.end(),
-                                [&](const Patch& patch) { return covers(patch, crossing); }))
+                                [&](const Disc& disc) { return covers(disc, crossing); }))
                     continue;
                 covered[batch[i]] = 1;
                 const auto& [p, n, h] = seeds[i];
                 if (!(h > 0.0)) continue;
                 particles.add(p, n, h, next_id++);
-                sown.push_back(patch_of(p, n, apart * h, apart * std::min(h, largest)));
+                sown.push_back(disc_of(p, n, apart * h, apart * std::min(h, largest)));
             }
             added += sown.size();
             parallel_for_each(sown.size(), 8, [&](std::size_t i) { mark(grid, own_number, sown[i]); });

@@ -23,7 +23,8 @@ constexpr double kFarther = 0.1, kFartherAtFolds = 0.45;  // the latter where so
 // inner side the middle between two crossings, each near a triangle of its own, is up to half the way between
 // them times that farther off. Some ways are longer than a spacing; that misses no more was measured.
 constexpr double kFartherBetween = 0.5;
-constexpr double kNearFold = 2.0;  // spacings: what is looked at beside a crossing is nearer to it
+constexpr double kNearFold =
+    2.0;  // spacings: a fold farther off is not between it and what lies in its cells
 // Spacings: so far around lie those that a crossing stands for.
 constexpr double kStandsForWithin = 0.5, kStandsForOnFlat = 2.0;
 constexpr double kFold = 0.9;  // cosine between a triangle's normal and that of a corner
@@ -57,12 +58,12 @@ std::vector<float> turns_at_vertices(const std::vector<Vec3>& vertices,
     return result;
 }
 
-/// The folds at a triangle: along an edge where both ends turn, or at one end alone.
+/// The folds at a triangle: along an edge where both ends turn; where one alone does, at that end.
 struct Folds {
     std::array<Vec3, 3> corner;
     std::array<double, 3> turn;  // at each
 
-    /// The sharpest that comes near a place, by a squared distance; 0: none.
+    /// The sharpest of those within a distance of a place, which is given squared; 0: none.
     double turn_near(const Vec3& p, double near2) const {
         double result = 0.0;
         for (int k = 0; k < 3; ++k) {
@@ -70,7 +71,7 @@ struct Folds {
             const double sharper = std::max(turn[k], turn[next]);
             if (!(sharper > result)) continue;
             const Vec3 &from = corner[turn[k] > 0.0 ? k : next], &to = corner[turn[next] > 0.0 ? next : k];
-            if (squared_distance(p, from, to, to) < near2) result = sharper;
+            if (squared_distance(p, from, to) < near2) result = sharper;
         }
         return result;
     }

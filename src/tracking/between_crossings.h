@@ -24,9 +24,9 @@ public:
     /// Points of the surface beside crossings that the mesh only just reaches: near its folds, the sharper
     /// the sooner, those with up to half a spacing of the crossings to spare, since from a fold what lies
     /// between two crossings may be much farther than either, but fewer where the surface is flat. Where some
-    /// crossings stand for others: those others, with no direction: a triangle may stand for them whichever
-    /// way it faces. Else points in cells, of those with an ambiguous face in all. What was returned before
-    /// is left out.
+    /// crossings stand for others: those others, all along folded triangles, with no direction: a triangle
+    /// may stand for them whichever way it faces. Else points in cells, of those with an ambiguous face in
+    /// all. What was returned before is left out.
     PackedCrossings points(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                            const MeshDistances& at_crossings);
 

@@ -68,8 +68,8 @@ struct FacetDifference {
 };
 
 /// Calls `same` with the numbers of each facet that is in both, in `now` and in `before`, from several
-/// threads. Of anything with a `facet_key`: both ascend by it but for those that have -1, which must equal
-/// nothing.
+/// threads; returns the others. Of anything with a `facet_key`: both ascend by it but for those that have -1,
+/// which must equal nothing.
 template <typename Now, typename Before, typename Same>
 FacetDifference compare(const Now& now, const Before& before, const Same& same) {
     constexpr std::size_t kBlock = 4096;

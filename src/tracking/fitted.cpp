@@ -40,9 +40,8 @@ void Fitted::fit_vertices(FrameMesh& mesh, std::size_t particles, const Surface&
     }
     std::vector<char> movable(mesh.vertices.size(), 0);
     std::vector<int> now(facets_.size(), -1);
-    const std::vector<std::size_t> came = compare(facets, facets_, [&](std::size_t f, std::size_t old) {
-                                              now[old] = static_cast<int>(f);
-                                          }).came;
+    const auto take_same = [&](std::size_t f, std::size_t old) { now[old] = static_cast<int>(f); };
+    const std::vector<std::size_t> came = compare(facets, facets_, take_same).came;
     for (const std::size_t f : came)
         for (const int v : triangles[f]) movable[v] = 1;
     facets_ = std::move(facets);

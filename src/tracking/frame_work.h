@@ -18,7 +18,7 @@ struct FrameWork {
     TrackedFrame frame;
     FrameMesh mesh;
     std::optional<CrossingGrid> crossings;
-    std::optional<Inspector> inspector;  ///< Of this mesh.
+    std::optional<Inspector> inspector;  ///< Of the meshes of this frame.
     Inspection inspection;
     bool follows = false;  ///< Most particles are of the frame before; else they are sampled anew.
 

@@ -359,7 +359,6 @@ void Inspector::doubt(const std::vector<Vec3>& places, double spacing, Inspectio
 
 void Inspector::prepare_topology() {
     if (!sides_) sides_.emplace(surface_);
-    lattice_component_count();
 }
 
 std::optional<std::size_t> Inspector::lattice_component_count() {
@@ -395,7 +394,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
     struct Failing {
         std::size_t triangle;
         std::optional<Shortage> at_crease;  // alone
-        std::optional<Vec3> dual;           // in the middle of its ball
+        std::optional<Vec3> dual;           // the dual crossing of its facet
     };
     const auto dual_of = [&](std::size_t t, bool whole) {
         return whole && carved.inside_cell(t) >= 0
@@ -426,7 +425,7 @@ std::vector<Shortage> shortages(const FrameMesh& mesh, const Inspection& inspect
             result.push_back(*at_crease);
             continue;
         }
-        if (dual) {  // whose corners a flip may have exchanged
+        if (dual) {  // the radius is that of the facet's ball: a flip may have exchanged the corners
             const int on_ball =
                 cells.vertices[carved.inside_cell(t)][Tetrahedra::kFacet[carved.inside_facet(t)][0]];
             result.push_back({*dual, (*dual - particles.position[on_ball]).norm()});

@@ -33,7 +33,7 @@ struct Doubt {
 struct Inspection {
     std::shared_ptr<const std::vector<FacetError>> errors;  ///< Per triangle; the inspector has them, too.
     /// Farther from the mesh than the tolerance: crossings, and points of the surface between such as are
-    /// nearly so far off, at folds of the mesh, or in cells with an ambiguous face; see BetweenCrossings.
+    /// nearly so far off, near folds of the mesh, or in cells with an ambiguous face; see BetweenCrossings.
     std::vector<Surface::Crossing> missed;
     double farthest_crossing = 0.0;      ///< Of these and those, as far as they were found.
     double crossings_mean_square = 0.0;  ///< Of the crossings that were found.
@@ -92,10 +92,9 @@ public:
     std::vector<const CrossingGrid*> reached() const;
     /// Whether some crossings stand for all: the tolerance is several resolutions.
     bool thins_out() const { return crossings_.thinned_out(surface_); }
-    /// What looking at the topology, and then mending it, needs of the surface alone; done then if not
-    /// before.
+    /// What looking at the topology needs of the surface alone; done then if not before.
     void prepare_topology();
-    /// That of the surface, which is counted once.
+    /// The surface's, counted once.
     std::optional<std::size_t> lattice_component_count();
     /// The topology of the mesh just inspected. The first time its faults are doubtful places; what more
     /// particles there do not mend then they seldom do.
@@ -138,7 +137,7 @@ private:
     bool measured_ = false;                 // and kept up to date from then on
     std::vector<std::vector<int>> missed_;  // of each of distances_, ascending
     std::optional<LatticeSides> sides_;
-    std::optional<std::optional<std::size_t>> component_count_;
+    std::optional<std::optional<std::size_t>> component_count_;  // none: not counted yet
     bool looked_at_topology_ = false;
 };
 

@@ -45,7 +45,7 @@ void Tracker::Impl::Making::mesh_particles() {
             measure_expected = inspector.expect(particles().position, last_mesh.triangles);
         tracker_.tetrahedralise(true, work_.frame.seconds, [&] {
             if (measure_expected) measure_expected();
-            if (!tracker_.is_thick(work_)) inspector.prepare_topology();
+            tracker_.prepare_topology(work_);
         });
         // The last mesh is of no more use, and the most memory is needed from now on.
         last_mesh.take({}, particles().size());
@@ -147,7 +147,7 @@ void Tracker::Impl::Making::certify() {
 void Tracker::Impl::Making::patch() {
     fitted_ = {};  // of no more use
     densifier_.reset();
-    if (!guided() || options().min_edge) return;
+    if (!tracker_.patches()) return;
     const StageTimer timer(work_.frame.seconds, "certify");
     const std::vector<double>& thickness = tracker_.last_mesh.evidence.thickness;
     MeshTrials of_mesh(work_.mesh, work_.inspection, *work_.inspector, work_.limits);

@@ -8,7 +8,8 @@
 
 namespace isotrack {
 
-/// A frame on its way from particles in place to a mesh that passes. All references must outlive it.
+/// A frame on its way from particles in place to a mesh that passes. All references must outlive it; `work`
+/// has its inspector.
 class Tracker::Impl::Making {
 public:
     Making(Impl& tracker, FrameWork& work) : tracker_(tracker), work_(work) {}

@@ -232,14 +232,23 @@ bool Tracker::Impl::is_thick(const FrameWork& work) const {
     return std::all_of(thickness.begin(), thickness.end(), [&](double thick) { return thick > least; });
 }
 
+bool Tracker::Impl::patches() const {
+    return options.method != Method::Paper && options.reconstruction == Reconstruction::Guided &&
+           !options.min_edge;
+}
+
+void Tracker::Impl::prepare_topology(FrameWork& work) const {
+    if (is_thick(work)) return;
+    work.inspector->prepare_topology();
+    if (patches()) work.inspector->lattice_component_count();
+}
+
 /// Meshes the particles, and measures what the next births and deaths go by.
 void Tracker::Impl::measure(FrameWork& work) {
     constexpr int kSizingSteps = 3;  // barycentric lattice of the samples: with the centroid
     const Surface& surface = work.surface;
     auto& seconds = work.frame.seconds;
-    tetrahedralise(true, seconds, [&] {
-        if (!is_thick(work)) work.inspector->prepare_topology();
-    });
+    tetrahedralise(true, seconds, [&] { prepare_topology(work); });
     FrameMesh mesh = carve_mesh(surface, seconds);
     if (options.fit) {
         const StageTimer timer(seconds, "fit");

@@ -74,6 +74,10 @@ struct Tracker::Impl {
 
     /// Where nothing is thin the nodes of the lattice need not be looked at: the Euler number tells.
     bool is_thick(const FrameWork& work) const;
+    /// Whether parts of a mesh may be exchanged for those of the lattice.
+    bool patches() const;
+    /// What looking at the nodes, and patching, will need of the surface alone. Reads no positions.
+    void prepare_topology(FrameWork& work) const;
 
     void follow(FrameWork& work, const Pace& pace, bool warm);
     std::vector<char> restless(double detail) const;

@@ -56,16 +56,6 @@ TEST_F(TwoBumps, AreToldApartWhereValuesChangeSteeply) {
     EXPECT_LT((found(1.0, 0.7).where - narrow).norm(), 0.05);
 }
 
-TEST_F(TwoBumps, AreLookedAtNoCloserWhereThePointsAreTooMuch) {
-    const auto found_up_to = [&](double too_much) {
-        return certified_error(points[0], points[1], points[2], *bumps(0.2)->probe(), 1.0, 0.1, too_much)
-            .largest;
-    };
-    EXPECT_NEAR(found_up_to(0.15), 0.16, 1e-3);             // of the points
-    EXPECT_EQ(found_up_to(0.17), found(0.2, 0.1).largest);  // beyond it, but not at the points
-    EXPECT_EQ(found_up_to(0.19), found(0.2, 0.1).largest);
-}
-
 /// Counts what it is asked.
 class CountingProbe final : public Surface::Probe {
 public:
@@ -94,6 +84,26 @@ TEST(TriangleError, IsFoundBetweenThePointsOfASmoothOneByOneMore) {
     smooth.count = 0;
     EXPECT_NEAR(triangle_error(a, b, c, smooth, 3, 0.1).largest, 0.1 * 1.5 * 1.5, 2e-3);
     EXPECT_GT(smooth.count, kPoints + 1);
+}
+
+TEST(TriangleError, IsLookedAtNoCloserWhereItIsTooMuch) {
+    const Vec3 a(0, 0, 0), b(3, 0, 0), c(0, 3, 0);
+    constexpr double kDetail = 2.0;
+    constexpr int kPoints = 10;
+    ASSERT_EQ(error_steps(a, b, c, kDetail), 3);
+    // 0.13 at the points, 0.15 between them.
+    CountingProbe kink([](const Vec3& p) { return 0.1 * (1.5 - std::abs(p.x() - 1.3)) - 0.02 * p.y(); });
+    const auto found_up_to = [&](double too_much) {
+        kink.count = 0;
+        return certified_error(a, b, c, kink, kDetail, 0.11, too_much).largest;
+    };
+    const double in_full = certified_error(a, b, c, kink, kDetail, 0.11).largest;
+    EXPECT_NEAR(in_full, 0.15, 4e-3);
+    EXPECT_NEAR(found_up_to(0.115), 0.12, 1e-9);
+    EXPECT_EQ(kink.count, kPoints);
+    EXPECT_GT(found_up_to(0.14), 0.14);  // found between them
+    EXPECT_GT(kink.count, kPoints);
+    EXPECT_EQ(found_up_to(0.16), in_full);
 }
 
 TEST(TriangleError, IsFollowedWhereThePointsAreNoneOfASmoothOne) {

@@ -78,48 +78,72 @@ struct InspectorOfABox : ::testing::Test {
     }
 };
 
-TEST_F(InspectorOfABox, LooksBetweenCrossingsNearFoldsAlone) {
-    // A mesh of twelve triangles, nowhere so far off that it is looked at for that.
-    constexpr double kTolerance = 0.5 * kResolution, kOff = 0.7 * kTolerance;
-    const Vec3 middle(0.01, 0.02, 0.03), half(1.0, 0.7, 0.45);
+/// A mesh around the box, nowhere so far off that it is looked at for that alone.
+struct BetweenCrossingsOfABox : InspectorOfABox {
+    static constexpr double kTolerance = 0.5 * kResolution, kOff = 0.7 * kTolerance;
+    const Vec3 middle{0.01, 0.02, 0.03}, half{1.0, 0.7, 0.45};
     std::vector<Vec3> vertices;
-    for (int k = 0; k < 8; ++k)
-        vertices.push_back(
-            middle +
-            ((half.array() - kOff) * (2.0 * Eigen::Array3d(k & 1, k >> 1 & 1, k >> 2) - 1.0)).matrix());
     std::vector<Triangle> triangles;
-    for (int axis = 0; axis < 3; ++axis)
-        for (const int side : {0, 1}) {
-            const int low = side << axis, u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3;
-            const int a = low, b = low + (side == 1 ? u : v), c = low + u + v, d = low + (side == 1 ? v : u);
-            triangles.insert(triangles.end(), {{a, b, c}, {a, c, d}});
-        }
-    MeshDistances distances(crossings, 3.0 * kTolerance);
-    distances.measure(vertices, triangles, {});
-    for (std::size_t c = 0; c < crossings.size(); ++c) ASSERT_NEAR(distances[c], kOff, 0.3 * kOff);
-    BetweenCrossings between(*box, crossings, {}, kTolerance);
-    const PackedCrossings points = between.points(vertices, triangles, distances);
-    // All its edges have ends that turn.
-    const auto from_edge = [&](const Vec3& p) {
+    MeshDistances distances{crossings, 3.0 * kTolerance};
+
+    void SetUp() override {
+        for (int k = 0; k < 8; ++k)
+            vertices.push_back(
+                middle +
+                ((half.array() - kOff) * (2.0 * Eigen::Array3d(k & 1, k >> 1 & 1, k >> 2) - 1.0)).matrix());
+        for (int axis = 0; axis < 3; ++axis)
+            for (const int side : {0, 1}) {
+                const int a = side << axis, u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3;
+                const int b = a + (side == 1 ? u : v), c = a + u + v, d = a + (side == 1 ? v : u);
+                triangles.insert(triangles.end(), {{a, b, c}, {a, c, d}});
+            }
+        distances.measure(vertices, triangles, {});
+        for (std::size_t c = 0; c < crossings.size(); ++c) ASSERT_NEAR(distances[c], kOff, 0.1 * kOff);
+    }
+    /// Of what is found at a mesh: all that is within a resolution of a place, and nothing that is farther
+    /// than four.
+    template <typename Distance>
+    void expect_near(const Distance& from, const std::vector<Vec3>& at, const std::vector<Triangle>& of) {
+        const PackedCrossings points =
+            BetweenCrossings(*box, crossings, {}, kTolerance).points(at, of, distances);
+        std::vector<int> all(crossings.size());
+        std::iota(all.begin(), all.end(), 0);
+        const PackedCrossings cells = CellPoints(*box, crossings, {}).around(all);
+        const auto count = [&](const PackedCrossings& some, double distance) {
+            std::size_t result = 0;
+            for (std::size_t i = 0; i < some.size(); ++i) result += from(some.point(i)) < distance;
+            return result;
+        };
+        EXPECT_GT(count(points, kResolution), 0u);
+        EXPECT_EQ(count(points, kResolution), count(cells, kResolution));
+        EXPECT_EQ(count(points, 4.0 * kResolution), points.size());
+        EXPECT_LT(points.size(), cells.size());
+    }
+};
+
+TEST_F(BetweenCrossingsOfABox, AreLookedAtAlongEdgesWhereBothEndsTurn) {
+    const auto from_edges = [&](const Vec3& p) {
         double least = 1.0;
         for (const Triangle& t : triangles)
-            for (int k = 0; k < 3; ++k) {
-                const Vec3 &from = vertices[t[k]], &to = vertices[t[(k + 1) % 3]];
-                least = std::min(least, std::sqrt(squared_distance(p, from, to, to)));
-            }
-        return least;
+            for (int k = 0; k < 3; ++k)
+                least = std::min(least, squared_distance(p, vertices[t[k]], vertices[t[(k + 1) % 3]]));
+        return std::sqrt(least);
     };
-    std::vector<int> all(crossings.size());
-    std::iota(all.begin(), all.end(), 0);
-    const PackedCrossings cells = CellPoints(*box, crossings, {}).around(all);
-    const auto count_near = [&](const PackedCrossings& some, double distance) {
-        std::size_t count = 0;
-        for (std::size_t i = 0; i < some.size(); ++i) count += from_edge(some.point(i)) < distance;
-        return count;
-    };
-    EXPECT_EQ(count_near(points, kResolution), count_near(cells, kResolution));
-    EXPECT_GT(points.size(), 300u);
-    EXPECT_EQ(count_near(points, 4.0 * kResolution), points.size());
+    expect_near(from_edges, vertices, triangles);
+}
+
+TEST_F(BetweenCrossingsOfABox, AreLookedAtAroundATip) {
+    // In the middle of a face; the sides are 35 degrees steep, so that what is around it turns by half that.
+    constexpr double kRadius = 0.6, kDepth = 0.36;
+    const Vec3 tip = middle + Vec3(0.0, 0.0, half.z());
+    std::vector<Vec3> at{tip};
+    std::vector<Triangle> sides;
+    for (int k = 0; k < 6; ++k) {
+        const double way = k * 3.14159265358979323846 / 3.0;
+        at.emplace_back(tip + Vec3(kRadius * std::cos(way), kRadius * std::sin(way), -kDepth));
+        sides.push_back({0, k + 1, (k + 1) % 6 + 1});
+    }
+    expect_near([&](const Vec3& p) { return (p - tip).norm(); }, at, sides);
 }
 
 TEST_F(InspectorOfABox, FindsTheSameBetweenCrossingsByWhatChanged) {

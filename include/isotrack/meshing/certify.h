@@ -44,8 +44,8 @@ int error_steps(const Vec3& a, const Vec3& b, const Vec3& c, double detail);
 /// The error of triangle abc with `error_steps` intervals per edge; where that is above 1.4 `refine_above`
 /// or changes steeply, by 0.3 of the way between points or more, with 6 as well, and the larger of the two.
 /// Its normal, too. `detail`: what is smaller need not be seen, at least the surface's resolution;
-/// `refine_above`: as for `triangle_error`. What is above `too_much` is looked at no closer: its error is
-/// then that of the points alone, and the normal is not asked for.
+/// `refine_above`: as for `triangle_error`. What is found to be above `too_much` is looked at no
+/// closer: its error is the one found so far, and its normal is not asked for.
 TriangleError certified_error(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe,
                               double detail, double refine_above,
                               double too_much = std::numeric_limits<double>::infinity());
