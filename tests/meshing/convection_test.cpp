@@ -11,13 +11,14 @@
 #include "isotrack/meshing/certify.h"
 #include "isotrack/meshing/manifold.h"
 #include "isotrack/meshing/mesh_topology.h"
-#include "isotrack/meshing/self_intersections.h"
 #include "isotrack/surface/shapes.h"
 #include "support/samples.h"
+#include "support/solid.h"
 
 namespace isotrack {
 namespace {
 
+using support::expect_solid;
 using support::mesh_of;
 using support::Samples;
 
@@ -27,17 +28,6 @@ TriangleMesh guided_mesh(const Surface& surface, double edge, std::uint64_t seed
     const Samples s(surface, edge, seed);
     const auto labels = guided_convection(s.cells, s.particles.position, s.particles.normal, surface);
     return mesh_of(carve(s.cells, labels, s.particles.position), s.particles.position);
-}
-
-void expect_solid(const TriangleMesh& mesh, std::size_t components, long euler) {
-    const MeshTopology t = mesh_topology(mesh);
-    EXPECT_TRUE(t.closed());
-    EXPECT_TRUE(t.oriented());
-    EXPECT_TRUE(t.manifold());
-    EXPECT_EQ(t.unused_vertices, 0u);
-    EXPECT_EQ(t.components, components);
-    EXPECT_EQ(t.euler, euler);
-    EXPECT_EQ(self_intersections(mesh).size(), 0u);
 }
 
 TEST(GuidedConvection, GivesOneSphere) {

@@ -9,10 +9,10 @@
 #include <string>
 
 #include "isotrack/meshing/mesh_topology.h"
-#include "isotrack/meshing/self_intersections.h"
 #include "isotrack/surface/shapes.h"
 #include "isotrack/tracking/tracker.h"
 #include "support/distance.h"
+#include "support/solid.h"
 
 namespace isotrack::support {
 
@@ -28,14 +28,7 @@ inline TrackerOptions with_tolerance(double tolerance) {
 inline void expect_sound(const TrackedFrame& frame, std::size_t components, long euler,
                          const std::string& where) {
     SCOPED_TRACE(where);
-    const MeshTopology t = mesh_topology(frame.mesh);
-    EXPECT_TRUE(t.closed());
-    EXPECT_TRUE(t.oriented());
-    EXPECT_TRUE(t.manifold());
-    EXPECT_EQ(t.unused_vertices, 0u);
-    EXPECT_EQ(t.components, components);
-    EXPECT_EQ(t.euler, euler);
-    EXPECT_EQ(self_intersections(frame.mesh).size(), 0u);
+    expect_solid(frame.mesh, components, euler);
     EXPECT_GE(enclosed_volume(frame.mesh), 0.0);
     EXPECT_EQ(frame.mesh.ids.size(), frame.mesh.points.size());
     EXPECT_EQ(frame.mesh.velocities.size(), frame.mesh.points.size());
