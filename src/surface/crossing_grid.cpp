@@ -58,7 +58,8 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     if (crossings.size == 0) return;
     const std::size_t columns = first_.size() - 1;
     // Each goes to the next free place of its column, in any order: they are sorted then. To make them takes
-    // longer than anything else here, so they are held twice; a frame needs its most memory later.
+    // longer than anything else here, so they are held twice, which is about as much as a frame needs later.
+    // Blocks made and freed on the way would take more: a thread's heap keeps what was freed.
     Entries made(crossings.size);
     std::vector<std::atomic<std::uint32_t>> next(columns);
     Directions directions;

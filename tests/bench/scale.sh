@@ -3,15 +3,24 @@
 # figures that are missed. The surface is a sphere with bumps that travel; a warm frame is the mean of the last two of four in
 # the first table, of the last six of eight in the others.
 # usage: scale.sh PROGRAM_DIR [--large] [VOXELS_PER_DIAGONAL...]
+#        scale.sh PROGRAM_DIR --long
 # PROGRAM_DIR holds isotrack_scale. --large adds the row of 500 000 particles. Without VOXELS_PER_DIAGONAL: 256 512 1024 2048.
+# --long prints instead of all that what memory a run takes, from few frames to 200.
 set -euo pipefail
 program=$1/isotrack_scale
 shift
 large=0
-if [ "${1-}" = --large ]; then
+long=0
+case ${1-} in
+--large)
     large=1
     shift
-fi
+    ;;
+--long)
+    long=1
+    shift
+    ;;
+esac
 [ $# -gt 0 ] || set -- 256 512 1024 2048
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -55,6 +64,41 @@ print_missed() {
     : >"$work/missed"
 }
 
+# size_for PARTICLES [OPTION...]. Of this surface: particles times tolerance, and the voxel that leaves two of them between neighbours.
+size_for() {
+    tolerance=$(calculate "11.5 / $1")
+    write --voxel "$(calculate "0.55 / sqrt($1)")" "${@:2}"
+}
+print_machine() {
+    echo "Measured on $(nproc) cores, $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)."
+}
+
+if [ "$long" = 1 ]; then
+    echo "Peak memory of runs from files to files above the program and two grids, bytes per particle."
+    echo
+    echo "| frames | particles | bytes per particle | with --fit: particles | bytes per particle |"
+    echo "|---:|---:|---:|---:|---:|"
+    for frames in 8 50 200; do
+        size_for 16000 --frames "$frames"
+        run_files >"$work/row.csv"
+        run_files --fit | sed 1d >>"$work/row.csv"
+        evaluate -v frames="$frames" '
+            END {
+                bytes = 1048576 * value["above_mb"] / value["particles"]
+                fitted_bytes = 1048576 * second["above_mb"] / second["particles"]
+                printf "| %d | %d | %d | %d | %d |\n", frames, value["particles"], bytes, second["particles"], fitted_bytes
+                miss(bytes > 1500, sprintf("%d frames: %d bytes per particle", frames, bytes))
+                miss(fitted_bytes > 1500, sprintf("%d frames with --fit: %d bytes per particle", frames, fitted_bytes))
+            }'
+    done
+    echo
+    echo "Wanted: at most 1500."
+    print_missed
+    echo
+    print_machine
+    exit
+fi
+
 echo "Resolution, at the same tolerance in world units, half a voxel of 256 per diagonal; seconds. Reading a file, which volumeToMesh would have to do as well, is not in the total."
 echo
 echo "| voxels per diagonal | active voxels | particles | read | open | cover | other stages | total | volumeToMesh, adaptivity 0.1 | 0 | total over 0.1 | over 0 | cover, ns per active voxel |"
@@ -83,12 +127,6 @@ done
 echo
 echo "Wanted: cover at most 30 ns per active voxel; the time of the other stages does not grow (by no more than a tenth); the total below volumeToMesh's at adaptivity 0.1 from 1024 on, at adaptivity 0 from 2048 on."
 print_missed
-
-# PARTICLES [OPTION...]. Of this surface: particles times tolerance, and the voxel that leaves two of them between neighbours.
-size_for() {
-    tolerance=$(calculate "11.5 / $1")
-    write --voxel "$(calculate "0.55 / sqrt($1)")" "${@:2}"
-}
 
 echo
 size_for 25000 --frames 8
@@ -190,4 +228,4 @@ echo
 echo "Wanted: at most 1.15 of the slowest."
 print_missed
 echo
-echo "Measured on $(nproc) cores, $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)."
+print_machine
