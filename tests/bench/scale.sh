@@ -9,15 +9,10 @@
 set -euo pipefail
 program=$1/isotrack_scale
 shift
-large=0
-long=0
+option=
 case ${1-} in
---large)
-    large=1
-    shift
-    ;;
---long)
-    long=1
+--large | --long)
+    option=$1
     shift
     ;;
 esac
@@ -73,7 +68,7 @@ print_machine() {
     echo "Measured on $(nproc) cores, $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)."
 }
 
-if [ "$long" = 1 ]; then
+if [ "$option" = --long ]; then
     echo "Peak memory of runs from files to files above the program and two grids, bytes per particle."
     echo
     echo "| frames | particles | bytes per particle | with --fit: particles | bytes per particle |"
@@ -157,7 +152,7 @@ echo
 echo "| particles | active voxels | tolerance, voxels | seconds, without read | particles per second | peak memory above the grid and the program, bytes per particle | of a run from files to files, above two grids | with --fit: particles | seconds | of these the fit | particles per second | bytes per particle | of a run |"
 echo "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
 sizes="5000 16000 50000 160000"
-[ "$large" = 0 ] || sizes="$sizes 500000"
+[ "$option" != --large ] || sizes="$sizes 500000"
 for size in $sizes; do
     size_for "$size" --frames 8
     track_six --tolerance "$tolerance"
