@@ -14,17 +14,20 @@ namespace isotrack {
 
 namespace {
 
-/// Different directions, numbered as they are met by several threads.
+/// Different directions, found by several threads.
 class Directions {
 public:
-    std::uint32_t number_of(const Eigen::Vector3f& direction) {
+    void add(const Eigen::Vector3f& direction) {
         const std::lock_guard lock(mutex_);
-        const auto number =
-            static_cast<std::uint32_t>(std::find(all_.begin(), all_.end(), direction) - all_.begin());
-        if (number == all_.size()) all_.push_back(direction);
-        return number;
+        if (std::find(all_.begin(), all_.end(), direction) == all_.end()) all_.push_back(direction);
     }
-    const std::vector<Eigen::Vector3f>& all() const { return all_; }
+    /// Those there are, given up.
+    std::vector<Eigen::Vector3f> sorted() {
+        std::sort(all_.begin(), all_.end(), [](const auto& a, const auto& b) {
+            return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+        });
+        return std::move(all_);
+    }
 
 private:
     std::mutex mutex_;
@@ -57,60 +60,65 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     : CrossingGrid(spacing, box.min(), box.sizes(), crossings.size) {
     if (crossings.size == 0) return;
     const std::size_t columns = first_.size() - 1;
-    // Each goes to the next free place of its column, in any order: they are sorted then. To make them takes
-    // longer than anything else here, so they are held twice, which is about as much as a frame needs later.
-    // Blocks made and freed on the way would take more: a thread's heap keeps what was freed.
-    Entries made(crossings.size);
+    const auto offset_of = [&](const Surface::Crossing& crossing) -> Offset {
+        return (crossing.point - origin_).cast<float>();
+    };
+    // They are made to be counted, and again to be put in their place: held twice they would take more memory
+    // than anything that a frame needs later.
     std::vector<std::atomic<std::uint32_t>> next(columns);
     Directions directions;
-    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, Entries::kBlock);
+    std::atomic<bool> all_alone = true;
+    const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, Offsets::kBlock);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
-        std::vector<std::pair<Eigen::Vector3f, std::uint32_t>> known;
+        std::vector<Eigen::Vector3f> known;
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
             const Surface::Crossing crossing = crossings.at(c);
-            auto direction = std::find_if(known.begin(), known.end(),
-                                          [&](const auto& k) { return k.first == crossing.outward; });
-            if (direction == known.end())
-                direction =
-                    known.insert(known.end(), {crossing.outward, directions.number_of(crossing.outward)});
-            Entry& entry = made[c];
-            entry = {(crossing.point - origin_).cast<float>(), direction->second,
-                     static_cast<std::uint32_t>(crossing.stands_for), crossing.flat};
-            next[column_of(entry.offset)].fetch_add(1, std::memory_order_relaxed);
+            if (std::find(known.begin(), known.end(), crossing.outward) == known.end())
+                directions.add(known.emplace_back(crossing.outward));
+            if (crossing.stands_for != 1 || crossing.flat) all_alone.store(false, std::memory_order_relaxed);
+            next[column_of(offset_of(crossing))].fetch_add(1, std::memory_order_relaxed);
+        }
+    });
+    for (std::size_t c = 0; c < columns; ++c) {
+        first_[c + 1] = first_[c] + next[c].load(std::memory_order_relaxed);
+        next[c].store(first_[c], std::memory_order_relaxed);
+    }
+    // Each goes to the next free place of its column, in any order: they are sorted then.
+    constexpr std::size_t kMostInShort = 256;
+    directions_ = directions.sorted();
+    offsets_ = Offsets(crossings.size);
+    kinds_ = Kinds(crossings.size, all_alone && directions_.size() <= kMostInShort);
+    tbb::parallel_for(range_of_all, [&](const auto& range) {
+        for (std::size_t c = range.begin(); c < range.end(); ++c) {
+            const Surface::Crossing crossing = crossings.at(c);
+            const Offset offset = offset_of(crossing);
+            const std::uint32_t at = next[column_of(offset)].fetch_add(1, std::memory_order_relaxed);
+            const auto direction = std::find(directions_.begin(), directions_.end(), crossing.outward);
+            offsets_[at] = offset;
+            kinds_.set(at, {static_cast<std::uint32_t>(direction - directions_.begin()),
+                            static_cast<std::uint32_t>(crossing.stands_for), crossing.flat});
         }
     });
     crossings.at = nullptr;  // which frees the list behind it, if there is one
-    for (std::size_t c = 0; c < columns; ++c) {
-        first_[c + 1] = first_[c] + next[c].load(std::memory_order_relaxed);
-        next[c].store(0, std::memory_order_relaxed);
-    }
-    directions_ = directions.all();
-    std::sort(directions_.begin(), directions_.end(), [](const auto& a, const auto& b) {
-        return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
-    });
-    std::vector<std::uint32_t> sorted;  // their numbers then
-    for (const Eigen::Vector3f& direction : directions.all())
-        sorted.push_back(static_cast<std::uint32_t>(
-            std::find(directions_.begin(), directions_.end(), direction) - directions_.begin()));
-    entries_ = Entries(crossings.size);
-    tbb::parallel_for(range_of_all, [&](const auto& range) {
-        for (std::size_t c = range.begin(); c < range.end(); ++c) {
-            const std::size_t column = column_of(made[c].offset);
-            Entry& entry = entries_[first_[column] + next[column].fetch_add(1, std::memory_order_relaxed)];
-            entry = made[c];
-            entry.direction = sorted[entry.direction];
-        }
-    });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns, 256), [&](const auto& range) {
-        std::vector<Entry> column;  // which may be parts of two blocks
+        struct Whole {
+            Offset offset;
+            Kind kind;
+        };
+        std::vector<Whole> column;  // which may be parts of two blocks
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
             column.clear();
-            for (std::size_t e = first_[c]; e < first_[c + 1]; ++e) column.push_back(entries_[e]);
-            std::sort(column.begin(), column.end(), [](const Entry& a, const Entry& b) {
-                return std::make_tuple(a.offset.z(), a.offset.x(), a.offset.y(), a.direction) <
-                       std::make_tuple(b.offset.z(), b.offset.x(), b.offset.y(), b.direction);
-            });
-            for (std::size_t e = first_[c]; e < first_[c + 1]; ++e) entries_[e] = column[e - first_[c]];
+            for (std::size_t i = first_[c]; i < first_[c + 1]; ++i)
+                column.push_back({offsets_[i], kinds_[i]});
+            const auto key = [](const Whole& w) {
+                return std::make_tuple(w.offset.z(), w.offset.x(), w.offset.y(), +w.kind.direction);
+            };
+            std::sort(column.begin(), column.end(),
+                      [&](const Whole& a, const Whole& b) { return key(a) < key(b); });
+            for (std::size_t i = first_[c]; i < first_[c + 1]; ++i) {
+                offsets_[i] = column[i - first_[c]].offset;
+                kinds_.set(i, column[i - first_[c]].kind);
+            }
         }
     });
 }
@@ -125,7 +133,7 @@ CrossingGrid CrossingGrid::some(std::vector<int>& numbers) const {
     std::vector<Place> places;
     places.reserve(numbers.size());
     for (const int number : numbers) {
-        const Eigen::Vector3f& offset = entries_[number].offset;
+        const Offset& offset = offsets_[number];
         places.push_back({result.column_of(offset), offset.z(), number});
         ++result.first_[places.back().column + 1];
     }
@@ -133,10 +141,12 @@ CrossingGrid CrossingGrid::some(std::vector<int>& numbers) const {
     tbb::parallel_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
         return std::tie(a.column, a.z, a.number) < std::tie(b.column, b.z, b.number);
     });
-    result.entries_ = Entries(places.size());
+    result.offsets_ = Offsets(places.size());
+    result.kinds_ = Kinds(places.size(), kinds_.has_short_form());
     for (std::size_t i = 0; i < places.size(); ++i) {
         numbers[i] = places[i].number;
-        result.entries_[i] = entries_[places[i].number];
+        result.offsets_[i] = offsets_[places[i].number];
+        result.kinds_.set(i, kinds_[places[i].number]);
     }
     result.directions_ = directions_;
     return result;

@@ -19,20 +19,20 @@ public:
     explicit CrossingGrid(const Surface& surface, double apart = 0.0)
         : CrossingGrid(std::max(surface.resolution(), apart), surface.bounds(),
                        surface.crossing_sequence(apart)) {}
-    /// `spacing` of the crossings, world units. Few different directions, as those of a lattice. Each is
-    /// asked for twice.
+    /// `spacing` of the crossings, world units. Few different directions, as those of a lattice: 65 536 at
+    /// most. Each crossing is asked for three times.
     CrossingGrid(Surface::CrossingSequence crossings, double spacing);
     CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
         : CrossingGrid(Surface::CrossingSequence(std::move(crossings)), spacing) {}
 
-    std::size_t size() const { return entries_.size(); }
-    bool empty() const { return entries_.empty(); }
+    std::size_t size() const { return offsets_.size(); }
+    bool empty() const { return size() == 0; }
     /// Its point is exact to 1e-7 of the extent of the surface's bounds, or of all crossings where these were
     /// given.
     Surface::Crossing operator[](std::size_t i) const {
-        const Entry& e = entries_[i];
-        return {origin_ + e.offset.cast<double>(), directions_[e.direction],
-                static_cast<std::int16_t>(e.stands_for), e.flat != 0};
+        const Kind kind = kinds_[i];
+        return {origin_ + offsets_[i].cast<double>(), directions_[kind.direction],
+                static_cast<std::int16_t>(kind.stands_for), kind.flat != 0};
     }
     double spacing() const { return spacing_; }
     /// Whether some of a surface's crossings stand for all.
@@ -51,16 +51,16 @@ public:
         for (int x = column(0, low.x()); x <= to[0]; ++x)
             for (int y = column(1, low.y()); y <= to[1]; ++y) {
                 const std::size_t at = static_cast<std::size_t>(x) * count_[1] + y;
-                entries_.for_each_run(
-                    first_[at], first_[at + 1], [&](const Entry* begin, const Entry* end, std::size_t first) {
-                        const Entry* e = std::lower_bound(
-                            begin, end, low.z(),
-                            [](const Entry& entry, double z) { return entry.offset.z() < z; });
-                        for (; e != end && e->offset.z() <= high.z(); ++e)
-                            if (e->offset.x() >= low.x() && e->offset.x() <= high.x() &&
-                                e->offset.y() >= low.y() && e->offset.y() <= high.y())
-                                visit(first + static_cast<std::size_t>(e - begin));
-                    });
+                offsets_.for_each_run(first_[at], first_[at + 1],
+                                      [&](const Offset* begin, const Offset* end, std::size_t first) {
+                                          const Offset* o = std::lower_bound(
+                                              begin, end, low.z(),
+                                              [](const Offset& offset, double z) { return offset.z() < z; });
+                                          for (; o != end && o->z() <= high.z(); ++o)
+                                              if (o->x() >= low.x() && o->x() <= high.x() &&
+                                                  o->y() >= low.y() && o->y() <= high.y())
+                                                  visit(first + static_cast<std::size_t>(o - begin));
+                                      });
             }
     }
 
@@ -70,30 +70,24 @@ private:
     /// Without crossings, for so many.
     CrossingGrid(double spacing, const Vec3& origin, const Vec3& size, std::size_t crossings);
 
-    /// A crossing in 16 bytes: there are more of them than of all else.
-    struct Entry {
-        Eigen::Vector3f offset;        // from origin_
-        std::uint32_t direction : 16;  // number among directions_
-        std::uint32_t stands_for : 15, flat : 1;
-    };
+    using Offset = Eigen::Vector3f;  // from origin_
     /// Many of them, in blocks, which fit into holes of the heap.
-    class Entries {
+    class Offsets {
     public:
-        Entries() = default;
-        explicit Entries(std::size_t size) : size_(size) {
+        Offsets() = default;
+        explicit Offsets(std::size_t size) : size_(size) {
             for (std::size_t begin = 0; begin < size; begin += kBlock)
                 blocks_.emplace_back(std::min(kBlock, size - begin));
         }
         std::size_t size() const { return size_; }
-        bool empty() const { return size_ == 0; }
-        Entry& operator[](std::size_t i) { return blocks_[i / kBlock][i % kBlock]; }
-        const Entry& operator[](std::size_t i) const { return blocks_[i / kBlock][i % kBlock]; }
+        Offset& operator[](std::size_t i) { return blocks_[i / kBlock][i % kBlock]; }
+        const Offset& operator[](std::size_t i) const { return blocks_[i / kBlock][i % kBlock]; }
         /// Calls `visit(begin, end, first)` with those from `first` on that are in one block.
         template <typename Visit>
         void for_each_run(std::size_t first, std::size_t end, const Visit& visit) const {
             for (std::size_t next; first < end; first = next) {
                 next = std::min(end, (first / kBlock + 1) * kBlock);
-                const Entry* begin = &(*this)[first];
+                const Offset* begin = &(*this)[first];
                 visit(begin, begin + (next - first), first);
             }
         }
@@ -101,17 +95,46 @@ private:
         static constexpr std::size_t kBlock = 4096;
 
     private:
-        std::vector<std::vector<Entry>> blocks_;
+        std::vector<std::vector<Offset>> blocks_;
         std::size_t size_ = 0;
+    };
+    /// What there is to a crossing beside where it is.
+    struct Kind {
+        std::uint32_t direction : 16;  // number among directions_
+        std::uint32_t stands_for : 15, flat : 1;
+    };
+    /// Of many crossings: there are more of them than of all else.
+    class Kinds {
+    public:
+        Kinds() = default;
+        /// `short_form`: all stand for themselves alone, none is flat, and there are no more than 256
+        /// directions.
+        Kinds(std::size_t size, bool short_form)
+            : direction_(short_form ? size : 0), whole_(short_form ? 0 : size) {}
+        Kind operator[](std::size_t i) const {
+            return whole_.empty() ? Kind{direction_[i], 1, 0} : whole_[i];
+        }
+        void set(std::size_t i, const Kind& kind) {
+            if (whole_.empty())
+                direction_[i] = static_cast<std::uint8_t>(kind.direction);
+            else
+                whole_[i] = kind;
+        }
+        bool has_short_form() const { return whole_.empty(); }
+
+    private:
+        std::vector<std::uint8_t> direction_;
+        std::vector<Kind> whole_;
     };
     int column(int axis, double offset) const {
         return static_cast<int>(std::clamp(offset / width_, 0.0, static_cast<double>(count_[axis] - 1)));
     }
-    std::size_t column_of(const Eigen::Vector3f& offset) const {
+    std::size_t column_of(const Offset& offset) const {
         return static_cast<std::size_t>(column(0, offset.x())) * count_[1] + column(1, offset.y());
     }
 
-    Entries entries_;
+    Offsets offsets_;
+    Kinds kinds_;
     std::vector<Eigen::Vector3f> directions_;  // those of a lattice: few
     std::vector<std::uint32_t> first_;         // of each column, and the end
     Vec3 origin_, size_;                       // of the box around them
