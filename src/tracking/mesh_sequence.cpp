@@ -37,34 +37,51 @@ double peak_memory_mb() {
     return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
-/// What the reading thread hands over: a level set, or why there is none.
+/// What the reading thread hands over, a grid, or why there is none; and the level set it becomes.
 struct ReadFrame {
     std::string grid_label;
+    openvdb::GridBase::ConstPtr grid;
     std::unique_ptr<LevelSet> level_set;
     openvdb::Vec3SGrid::ConstPtr velocity;
     std::string failure;
     double seconds = 0.0;
 };
 
-ReadFrame read_frame(const std::string& path, const MeshSequenceOptions& options) {
+/// Calls `step`, whose failure is that of the frame.
+template <typename Step>
+void take_step(ReadFrame& frame, const std::string& path, const Step& step) {
     const auto start = Clock::now();
-    ReadFrame frame;
     try {
-        const std::vector<GridInfo> grids = list_grids(path);
-        const GridInfo grid = choose_grid(grids, options.grid, path);
-        frame.grid_label = grid.label;
-        LevelSetOptions level_set_options;
-        level_set_options.iso = options.iso;
-        frame.level_set = std::make_unique<LevelSet>(read_grid(path, grid), level_set_options);
-        if (const auto velocity = choose_velocity_grid(grids, options.velocity_grid, path))
-            frame.velocity = openvdb::gridPtrCast<openvdb::Vec3SGrid>(read_grid(path, *velocity));
+        step();
     } catch (const std::exception& error) {
         const std::string what = error.what();
         frame.failure = what.find(path) == std::string::npos ? path + ": " + what : what;
-        frame.level_set.reset();
+        frame.grid.reset();
     }
-    frame.seconds = seconds_since(start);
+    frame.seconds += seconds_since(start);
+}
+
+ReadFrame read_frame(const std::string& path, const MeshSequenceOptions& options) {
+    ReadFrame frame;
+    take_step(frame, path, [&] {
+        const std::vector<GridInfo> grids = list_grids(path);
+        const GridInfo grid = choose_grid(grids, options.grid, path);
+        frame.grid_label = grid.label;
+        frame.grid = read_grid(path, grid);
+        if (const auto velocity = choose_velocity_grid(grids, options.velocity_grid, path))
+            frame.velocity = openvdb::gridPtrCast<openvdb::Vec3SGrid>(read_grid(path, *velocity));
+    });
     return frame;
+}
+
+/// When the frame's turn has come: a level set takes a good deal more memory than its grid.
+void open_level_set(ReadFrame& frame, const std::string& path, const MeshSequenceOptions& options) {
+    if (!frame.grid) return;
+    take_step(frame, path, [&] {
+        LevelSetOptions level_set_options;
+        level_set_options.iso = options.iso;
+        frame.level_set = std::make_unique<LevelSet>(std::move(frame.grid), level_set_options);
+    });
 }
 
 /// One frame along the velocity field, by the midpoint rule. `frame_time` in the unit of time of the
@@ -312,6 +329,7 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         }
         ReadFrame read = next.get();
         next = start_reading(i + 1);
+        open_level_set(read, row.input, options);
         row.grid = read.grid_label;
         if (!read.level_set) {
             finish_pending();
