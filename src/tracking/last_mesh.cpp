@@ -12,7 +12,6 @@
 namespace isotrack {
 namespace {
 
-/// The distance to the nearest Delaunay neighbour that faces the other way.
 std::vector<double> thickness_of(const Particles& particles, const Tetrahedra& cells) {
     std::vector<std::atomic<double>> th(particles.size());  // lowered by several threads
     for (auto& own : th) own.store(std::numeric_limits<double>::infinity(), std::memory_order_relaxed);
@@ -47,13 +46,16 @@ std::vector<Triangle> particle_triangles(const CarvedSurface& carved) {
     return result;
 }
 
-void LastMesh::take(std::vector<Triangle> of_mesh, std::size_t particles) {
+void LastMesh::take(std::vector<Triangle> of_mesh) {
     triangles = std::move(of_mesh);
+    ring = {};
+}
+
+void LastMesh::make_ring(std::size_t particles) {
     ring = ring_of(triangles, particles);
 }
 
-void LastMesh::take(const CarvedSurface& carved, const Particles& particles, const Tetrahedra& cells) {
-    take(particle_triangles(carved), particles.size());
+void LastMesh::measure_thickness(const Particles& particles, const Tetrahedra& cells) {
     evidence.error.resize(particles.size(), -1.0);
     evidence.thickness = thickness_of(particles, cells);
 }
@@ -77,7 +79,7 @@ void LastMesh::reorder(const std::vector<int>& order) {
     for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = static_cast<int>(i);
     for (Triangle& t : triangles)
         for (int& corner : t) corner = place[corner];
-    ring = ring_of(triangles, order.size());
+    make_ring(order.size());
 }
 
 void LastMesh::grow(std::size_t particles, const std::vector<Triangle>& parents) {

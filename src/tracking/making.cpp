@@ -48,7 +48,7 @@ void Tracker::Impl::Making::mesh_particles() {
             tracker_.prepare_topology(work_);
         });
         // The last mesh is of no more use, and the most memory is needed from now on.
-        last_mesh.take({}, particles().size());
+        last_mesh.take({});
         make_mesh();
         const StageTimer timer(work_.frame.seconds, "certify");
         if (in_paper()) break;
@@ -67,6 +67,11 @@ void Tracker::Impl::Making::mesh_particles() {
         work_.mesh = {};
         tracker_.make_room(work_.surface, work_.frame);
     }
+}
+
+void Tracker::Impl::Making::keep_mesh() {
+    tracker_.last_mesh.take(particle_triangles(work_.mesh.carved));
+    tracker_.last_mesh.measure_thickness(particles(), cells());
 }
 
 void Tracker::Impl::Making::insert_added() {
@@ -109,7 +114,7 @@ void Tracker::Impl::Making::mend_components() {
         MeshTrials trials(mesh, inspection, *work_.inspector, work_.limits);
         if (join_specks(trials, tracker_.labels, carve_labels, cells(), particles(), work_.surface,
                         work_.limits) > 0)
-            tracker_.last_mesh.take(mesh.carved, particles(), cells());
+            keep_mesh();
     }
     const std::vector<std::vector<Vec3>> lost = inspection.topology.lost;
     remove_specks(mesh, inspection, *work_.inspector, work_.limits);
@@ -134,7 +139,7 @@ void Tracker::Impl::Making::certify() {
             if (!passes_or_last()) continue;
         }
         inspector.look_between(mesh, inspection);
-        tracker_.last_mesh.take(mesh.carved, particles(), cells());
+        keep_mesh();
         const bool known = has_topology();
         if (!known) inspector.inspect_topology(mesh, inspection);
         if (!passes_or_last()) continue;

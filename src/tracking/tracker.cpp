@@ -257,7 +257,9 @@ void Tracker::Impl::measure(FrameWork& work) {
     const StageTimer timer(seconds, "size");
     last_mesh.evidence.error = errors_at_particles(
         mesh, triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps), particles.size());
-    last_mesh.take(mesh.carved, particles, dt->cells());
+    last_mesh.measure_thickness(particles, dt->cells());
+    last_mesh.take(particle_triangles(mesh.carved));
+    last_mesh.make_ring(particles.size());
 }
 
 /// The first particles, in order.
@@ -293,7 +295,8 @@ void Tracker::Impl::make_room(const Surface& surface, TrackedFrame& frame) {
     tetrahedralise(false, frame.seconds);
     const FrameMesh mesh = carve_mesh(surface, frame.seconds);
     const StageTimer timer(frame.seconds, "relax");
-    last_mesh.take(particle_triangles(mesh.carved), particles.size());
+    last_mesh.take(particle_triangles(mesh.carved));
+    last_mesh.make_ring(particles.size());
     frame.sweeps += relax(particles, last_mesh.ring.squared(), surface, kMendingSweeps);
 }
 
@@ -428,6 +431,7 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         making.mesh_particles();
         making.certify();
         if (will_build_anew()) forget_dt();  // first: much memory, of no use from here on
+        last_mesh.make_ring(particles.size());
         making.patch();
         if (options.method != Method::Paper &&
             making.is_of_particles())  // the next births and deaths go by what is left of errors
