@@ -182,10 +182,15 @@ private:
 std::vector<std::array<int, 2>> refit(std::vector<Vec3>& vertices, std::vector<Triangle>& triangles,
                                       const Surface& surface, double tolerance,
                                       const std::vector<char>& movable) {
-    ErrorFlips flips(vertices, triangles, surface, tolerance);
-    const auto done = flips.flip(movable);
-    fit_steps(vertices, triangles, Corners(vertices.size(), triangles), flips.take_facets(), surface,
-              kFitSteps, movable, kDamping);
+    std::vector<FacetValues> facets;
+    std::vector<std::array<int, 2>> done;
+    {  // which holds what is of no use to the steps
+        ErrorFlips flips(vertices, triangles, surface, tolerance);
+        done = flips.flip(movable);
+        facets = flips.take_facets();
+    }
+    fit_steps(vertices, triangles, Corners(vertices.size(), triangles), std::move(facets), surface, kFitSteps,
+              movable, kDamping);
     return done;
 }
 

@@ -43,19 +43,20 @@ std::vector<float> turns_at_vertices(const std::vector<Vec3>& vertices,
     std::vector<Eigen::Vector3f> sum(vertices.size(), Eigen::Vector3f::Zero());
     for (std::size_t t = 0; t < triangles.size(); ++t)
         for (const int v : triangles[t]) sum[v] += area[t];
-    std::vector<std::array<float, 3>> turn(triangles.size(), {0.0f, 0.0f, 0.0f});  // at each corner
+    std::vector<std::atomic<float>> turn(vertices.size());  // raised by several threads
+    const auto raise = [](std::atomic<float>& own, float to) {
+        float at = own.load(std::memory_order_relaxed);
+        while (at < to && !own.compare_exchange_weak(at, to, std::memory_order_relaxed)) {
+        }
+    };
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
-        for (int k = 0; k < 3; ++k) {
-            const Eigen::Vector3f& normal = sum[triangles[t][k]];
-            const float dot = area[t].dot(normal), norms = area[t].norm() * normal.norm();
+        for (const int v : triangles[t]) {
+            const float dot = area[t].dot(sum[v]), norms = area[t].norm() * sum[v].norm();
             if (dot >= kFold * norms) continue;
-            turn[t][k] = dot > 0.0f ? std::sqrt(1.0f - dot / norms * (dot / norms)) : 1.0f;
+            raise(turn[v], dot > 0.0f ? std::sqrt(1.0f - dot / norms * (dot / norms)) : 1.0f);
         }
     });
-    std::vector<float> result(vertices.size(), 0.0f);
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        for (int k = 0; k < 3; ++k) result[triangles[t][k]] = std::max(result[triangles[t][k]], turn[t][k]);
-    return result;
+    return {turn.begin(), turn.end()};
 }
 
 /// The folds at a triangle: along an edge where both ends turn; where one alone does, at that end.
