@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "atomic_extremes.h"
 #include "delaunay/circumcentre.h"
 #include "meshing/triangle_box.h"
 #include "meshing/triangle_distance.h"
@@ -273,12 +274,7 @@ namespace {
 class LeastSquare {
 public:
     float get() const { return value_.load(std::memory_order_relaxed); }
-    void take(double square) {
-        const auto candidate = static_cast<float>(square);
-        float now = get();
-        while (candidate < now && !value_.compare_exchange_weak(now, candidate, std::memory_order_relaxed)) {
-        }
-    }
+    void take(double square) { lower_to(value_, static_cast<float>(square)); }
 
 private:
     std::atomic<float> value_{std::numeric_limits<float>::infinity()};

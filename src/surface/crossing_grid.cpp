@@ -4,6 +4,7 @@
 #include <tbb/parallel_sort.h>
 
 #include <atomic>
+#include <cassert>
 #include <cmath>
 #include <mutex>
 #include <numeric>
@@ -21,8 +22,7 @@ public:
         const std::lock_guard lock(mutex_);
         if (std::find(all_.begin(), all_.end(), direction) == all_.end()) all_.push_back(direction);
     }
-    /// Those there are, given up.
-    std::vector<Eigen::Vector3f> sorted() {
+    std::vector<Eigen::Vector3f> take_sorted() {
         std::sort(all_.begin(), all_.end(), [](const auto& a, const auto& b) {
             return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
         });
@@ -85,7 +85,7 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     }
     // Each goes to the next free place of its column, in any order: they are sorted then.
     constexpr std::size_t kMostInShort = 256;
-    directions_ = directions.sorted();
+    directions_ = directions.take_sorted();
     offsets_ = Offsets(crossings.size);
     kinds_ = Kinds(crossings.size, all_alone && directions_.size() <= kMostInShort);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
@@ -94,6 +94,7 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
             const Offset offset = offset_of(crossing);
             const std::uint32_t at = next[column_of(offset)].fetch_add(1, std::memory_order_relaxed);
             const auto direction = std::find(directions_.begin(), directions_.end(), crossing.outward);
+            assert(at < crossings.size && direction != directions_.end());
             offsets_[at] = offset;
             kinds_.set(at, {static_cast<std::uint32_t>(direction - directions_.begin()),
                             static_cast<std::uint32_t>(crossing.stands_for), crossing.flat});
@@ -101,20 +102,20 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     });
     crossings.at = nullptr;  // which frees the list behind it, if there is one
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns, 256), [&](const auto& range) {
-        struct Whole {
+        struct Placed {
             Offset offset;
             Kind kind;
         };
-        std::vector<Whole> column;  // which may be parts of two blocks
+        std::vector<Placed> column;  // which may be parts of two blocks
+        const auto key = [](const Placed& p) {
+            return std::make_tuple(p.offset.z(), p.offset.x(), p.offset.y(), std::uint32_t{p.kind.direction});
+        };
         for (std::size_t c = range.begin(); c < range.end(); ++c) {
             column.clear();
             for (std::size_t i = first_[c]; i < first_[c + 1]; ++i)
                 column.push_back({offsets_[i], kinds_[i]});
-            const auto key = [](const Whole& w) {
-                return std::make_tuple(w.offset.z(), w.offset.x(), w.offset.y(), +w.kind.direction);
-            };
             std::sort(column.begin(), column.end(),
-                      [&](const Whole& a, const Whole& b) { return key(a) < key(b); });
+                      [&](const Placed& a, const Placed& b) { return key(a) < key(b); });
             for (std::size_t i = first_[c]; i < first_[c + 1]; ++i) {
                 offsets_[i] = column[i - first_[c]].offset;
                 kinds_.set(i, column[i - first_[c]].kind);

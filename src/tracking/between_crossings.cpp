@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "atomic_extremes.h"
 #include "find_in_blocks.h"
 #include "meshing/triangle_box.h"
 #include "meshing/triangle_distance.h"
@@ -44,16 +45,11 @@ std::vector<float> turns_at_vertices(const std::vector<Vec3>& vertices,
     for (std::size_t t = 0; t < triangles.size(); ++t)
         for (const int v : triangles[t]) sum[v] += area[t];
     std::vector<std::atomic<float>> turn(vertices.size());  // raised by several threads
-    const auto raise = [](std::atomic<float>& own, float to) {
-        float at = own.load(std::memory_order_relaxed);
-        while (at < to && !own.compare_exchange_weak(at, to, std::memory_order_relaxed)) {
-        }
-    };
     parallel_for_each(triangles.size(), kGrain, [&](std::size_t t) {
         for (const int v : triangles[t]) {
             const float dot = area[t].dot(sum[v]), norms = area[t].norm() * sum[v].norm();
             if (dot >= kFold * norms) continue;
-            raise(turn[v], dot > 0.0f ? std::sqrt(1.0f - dot / norms * (dot / norms)) : 1.0f);
+            raise_to(turn[v], dot > 0.0f ? std::sqrt(1.0f - dot / norms * (dot / norms)) : 1.0f);
         }
     });
     return {turn.begin(), turn.end()};

@@ -7,19 +7,16 @@
 #include <limits>
 #include <utility>
 
+#include "atomic_extremes.h"
 #include "sampling/compact.h"
 
 namespace isotrack {
 namespace {
 
+/// The distance to the nearest Delaunay neighbour that faces the other way.
 std::vector<double> thickness_of(const Particles& particles, const Tetrahedra& cells) {
     std::vector<std::atomic<double>> th(particles.size());  // lowered by several threads
     for (auto& own : th) own.store(std::numeric_limits<double>::infinity(), std::memory_order_relaxed);
-    const auto lower = [](std::atomic<double>& own, double to) {
-        double at = own.load(std::memory_order_relaxed);
-        while (to < at && !own.compare_exchange_weak(at, to, std::memory_order_relaxed)) {
-        }
-    };
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells.size(), 4096), [&](const auto& range) {
         for (std::size_t c = range.begin(); c < range.end(); ++c)
             for (int a = 0; a < 4; ++a)
@@ -27,8 +24,8 @@ std::vector<double> thickness_of(const Particles& particles, const Tetrahedra& c
                     const int i = cells.vertices[c][a], j = cells.vertices[c][b];
                     if (i < 0 || j < 0 || !(particles.normal[i].dot(particles.normal[j]) < 0.0)) continue;
                     const double apart = (particles.position[i] - particles.position[j]).norm();
-                    lower(th[i], apart);
-                    lower(th[j], apart);
+                    lower_to(th[i], apart);
+                    lower_to(th[j], apart);
                 }
     });
     return {th.begin(), th.end()};
@@ -51,13 +48,14 @@ void LastMesh::take(std::vector<Triangle> of_mesh) {
     ring = {};
 }
 
-void LastMesh::make_ring(std::size_t particles) {
-    ring = ring_of(triangles, particles);
-}
-
-void LastMesh::measure_thickness(const Particles& particles, const Tetrahedra& cells) {
+void LastMesh::take(const CarvedSurface& carved, const Particles& particles, const Tetrahedra& cells) {
+    take(particle_triangles(carved));
     evidence.error.resize(particles.size(), -1.0);
     evidence.thickness = thickness_of(particles, cells);
+}
+
+void LastMesh::make_ring(std::size_t particles) {
+    ring = ring_of(triangles, particles);
 }
 
 void LastMesh::retain(const std::vector<char>& keep) {

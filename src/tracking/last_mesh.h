@@ -21,12 +21,13 @@ struct LastMesh {
     std::vector<Triangle> triangles;
     SizingEvidence evidence;
 
-    /// From now on it is this mesh; the evidence stays, and the ring is left empty: in the making of a frame
-    /// it would take memory and be of no use.
+    /// From now on it is this mesh; the evidence stays. The ring is left empty: it takes memory, and is of
+    /// use when particles move.
     void take(std::vector<Triangle> of_mesh);
+    /// The same, and the thickness at its particles by the DT it was carved from: the distance to the nearest
+    /// Delaunay neighbour that faces the other way.
+    void take(const CarvedSurface& carved, const Particles& particles, const Tetrahedra& cells);
     void make_ring(std::size_t particles);
-    /// By the DT of the particles: the distance to the nearest Delaunay neighbour that faces the other way.
-    void measure_thickness(const Particles& particles, const Tetrahedra& cells);
     /// Only the particles whose flag is set are left.
     void retain(const std::vector<char>& keep);
     /// Particle i becomes that of order[i].

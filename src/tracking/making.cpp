@@ -69,11 +69,6 @@ void Tracker::Impl::Making::mesh_particles() {
     }
 }
 
-void Tracker::Impl::Making::keep_mesh() {
-    tracker_.last_mesh.take(particle_triangles(work_.mesh.carved));
-    tracker_.last_mesh.measure_thickness(particles(), cells());
-}
-
 void Tracker::Impl::Making::insert_added() {
     // A fitted mesh fails elsewhere than its particles do; of a DT built anew all cells are new.
     const bool refines = !options().fit && guided() && options().delaunay != UpdateStrategy::Rebuild;
@@ -114,7 +109,7 @@ void Tracker::Impl::Making::mend_components() {
         MeshTrials trials(mesh, inspection, *work_.inspector, work_.limits);
         if (join_specks(trials, tracker_.labels, carve_labels, cells(), particles(), work_.surface,
                         work_.limits) > 0)
-            keep_mesh();
+            tracker_.last_mesh.take(mesh.carved, particles(), cells());
     }
     const std::vector<std::vector<Vec3>> lost = inspection.topology.lost;
     remove_specks(mesh, inspection, *work_.inspector, work_.limits);
@@ -139,7 +134,7 @@ void Tracker::Impl::Making::certify() {
             if (!passes_or_last()) continue;
         }
         inspector.look_between(mesh, inspection);
-        keep_mesh();
+        tracker_.last_mesh.take(mesh.carved, particles(), cells());
         const bool known = has_topology();
         if (!known) inspector.inspect_topology(mesh, inspection);
         if (!passes_or_last()) continue;

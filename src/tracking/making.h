@@ -49,8 +49,6 @@ private:
     }
     /// Whether nothing is added and no label changes.
     bool passes();
-    /// The mesh is the last one, without a ring.
-    void keep_mesh();
     void insert_added();
     void mend_components();  // which may find more that is missed
 

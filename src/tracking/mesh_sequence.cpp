@@ -37,19 +37,19 @@ double peak_memory_mb() {
     return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
-/// What the reading thread hands over, a grid, or why there is none; and the level set it becomes.
+/// What the reading thread hands over: a grid, or why there is none. Then the level set made of it.
 struct ReadFrame {
     std::string grid_label;
     openvdb::GridBase::ConstPtr grid;
     std::unique_ptr<LevelSet> level_set;
     openvdb::Vec3SGrid::ConstPtr velocity;
     std::string failure;
-    double seconds = 0.0;
+    double read_seconds = 0.0, open_seconds = 0.0;
 };
 
-/// Calls `step`, whose failure is that of the frame.
+/// Does `step`, whose failure is that of the frame. Returns the seconds it took.
 template <typename Step>
-void take_step(ReadFrame& frame, const std::string& path, const Step& step) {
+double attempt(ReadFrame& frame, const std::string& path, const Step& step) {
     const auto start = Clock::now();
     try {
         step();
@@ -58,12 +58,12 @@ void take_step(ReadFrame& frame, const std::string& path, const Step& step) {
         frame.failure = what.find(path) == std::string::npos ? path + ": " + what : what;
         frame.grid.reset();
     }
-    frame.seconds += seconds_since(start);
+    return seconds_since(start);
 }
 
 ReadFrame read_frame(const std::string& path, const MeshSequenceOptions& options) {
     ReadFrame frame;
-    take_step(frame, path, [&] {
+    frame.read_seconds = attempt(frame, path, [&] {
         const std::vector<GridInfo> grids = list_grids(path);
         const GridInfo grid = choose_grid(grids, options.grid, path);
         frame.grid_label = grid.label;
@@ -77,7 +77,7 @@ ReadFrame read_frame(const std::string& path, const MeshSequenceOptions& options
 /// When the frame's turn has come: a level set takes a good deal more memory than its grid.
 void open_level_set(ReadFrame& frame, const std::string& path, const MeshSequenceOptions& options) {
     if (!frame.grid) return;
-    take_step(frame, path, [&] {
+    frame.open_seconds = attempt(frame, path, [&] {
         LevelSetOptions level_set_options;
         level_set_options.iso = options.iso;
         frame.level_set = std::make_unique<LevelSet>(std::move(frame.grid), level_set_options);
@@ -333,7 +333,7 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         row.grid = read.grid_label;
         if (!read.level_set) {
             finish_pending();
-            row.seconds["read"] = read.seconds;
+            row.seconds = {{"read", read.read_seconds}, {"open", read.open_seconds}};
             row.status = "failed";
             row.message = read.failure;
             stop = stop || options.on_error == OnError::Stop;
@@ -366,7 +366,8 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         tracked_frame = row.frame;
         finish_pending();
         if (stop) break;
-        auto write = [row, start, per_time, finish_mesh = std::move(finish_mesh), read_seconds = read.seconds,
+        auto write = [row, start, per_time, finish_mesh = std::move(finish_mesh),
+                      read_seconds = read.read_seconds, open_seconds = read.open_seconds,
                       level_set = std::move(read.level_set)]() mutable {
             TrackedFrame tracked = finish_mesh();
             finish_mesh = nullptr;  // the future would keep what it has
@@ -375,6 +376,7 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
             for (Vec3& v : tracked.mesh.velocities) v *= per_time;
             describe(tracked, row);
             row.seconds["read"] = read_seconds;
+            row.seconds["open"] = open_seconds;
             row.seconds["total"] = seconds_since(start);
             const auto write_start = Clock::now();
             write_mesh(tracked.mesh, row.output);

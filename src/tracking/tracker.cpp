@@ -257,8 +257,7 @@ void Tracker::Impl::measure(FrameWork& work) {
     const StageTimer timer(seconds, "size");
     last_mesh.evidence.error = errors_at_particles(
         mesh, triangle_errors(mesh.vertices, mesh.carved.triangles, surface, kSizingSteps), particles.size());
-    last_mesh.measure_thickness(particles, dt->cells());
-    last_mesh.take(particle_triangles(mesh.carved));
+    last_mesh.take(mesh.carved, particles, dt->cells());
     last_mesh.make_ring(particles.size());
 }
 
@@ -378,6 +377,7 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     {
         const StageTimer timer(frame.seconds, "carry");
         if (astray()) arrange();
+        if (last_mesh.ring.size() == 0) last_mesh.make_ring(particles.size());
         last_mesh.grow(particles.size());  // a frame that failed midway may have left it behind
         const std::vector<char> found = carry(particles, last_mesh.ring, surface, motion);
         particles.retain(found);
@@ -431,7 +431,6 @@ Tracker::Finish Tracker::Impl::begin(const Surface& surface, const Motion& motio
         making.mesh_particles();
         making.certify();
         if (will_build_anew()) forget_dt();  // first: much memory, of no use from here on
-        last_mesh.make_ring(particles.size());
         making.patch();
         if (options.method != Method::Paper &&
             making.is_of_particles())  // the next births and deaths go by what is left of errors

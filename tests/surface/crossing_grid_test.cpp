@@ -77,40 +77,41 @@ TEST(CrossingGrid, FindsWhatIsInABox) {
 }
 
 TEST(CrossingGrid, KeepsTheDirectionAndWhatACrossingStandsFor) {
-    // Few directions and many; all that stand for themselves alone, and others among them.
+    // Few directions and many; with all alone, some on flat sheets, and some that stand for others as well.
     for (const int directions : {6, 256, 257, 1000})
-        for (const bool some_for_others : {false, true}) {
-            constexpr int kCount = 2000;
-            std::vector<Surface::Crossing> crossings;
-            for (int i = 0; i < kCount; ++i) {
-                const float angle = 0.001f * static_cast<float>(i % directions);
-                Surface::Crossing c{Vec3(0.5 * i, 0.0, 0.0), {std::cos(angle), std::sin(angle), 0.0f}};
-                if (some_for_others && i % 7 == 0) {
-                    c.stands_for = static_cast<std::int16_t>(1 + i % 5 * 8191);
-                    c.flat = i % 2 == 0;
+        for (const bool some_flat : {false, true})
+            for (const bool some_for_others : {false, true}) {
+                constexpr int kCount = 2000;
+                std::vector<Surface::Crossing> crossings;
+                for (int i = 0; i < kCount; ++i) {
+                    const float angle = 0.001f * static_cast<float>(i % directions);
+                    Surface::Crossing c{Vec3(0.5 * i, 0.0, 0.0), {std::cos(angle), std::sin(angle), 0.0f}};
+                    c.flat = some_flat && i % 2 == 0;
+                    if (some_for_others && i % 7 == 0)
+                        c.stands_for = static_cast<std::int16_t>(1 + i % 5 * 8191);
+                    crossings.push_back(c);
                 }
-                crossings.push_back(c);
-            }
-            std::mt19937 random(3);
-            std::vector<Surface::Crossing> shuffled = crossings;
-            std::shuffle(shuffled.begin(), shuffled.end(), random);
-            const CrossingGrid grid(shuffled, 0.5);
-            std::vector<int> numbers(kCount);
-            std::iota(numbers.begin(), numbers.end(), 0);
-            const CrossingGrid copy = grid.some(numbers);
-            for (const CrossingGrid* of : {&grid, &copy}) {
-                ASSERT_EQ(of->size(), crossings.size());
-                for (std::size_t i = 0; i < of->size(); ++i) {
-                    const Surface::Crossing found = (*of)[i];
-                    const auto& wanted =
-                        crossings[static_cast<std::size_t>(std::lround(found.point.x() / 0.5))];
-                    EXPECT_NEAR(found.point.x(), wanted.point.x(), 1e-7 * 0.5 * kCount);
-                    EXPECT_EQ(found.outward, wanted.outward);
-                    EXPECT_EQ(found.stands_for, wanted.stands_for);
-                    EXPECT_EQ(found.flat, wanted.flat);
+                std::mt19937 random(3);
+                std::vector<Surface::Crossing> shuffled = crossings;
+                std::shuffle(shuffled.begin(), shuffled.end(), random);
+                const CrossingGrid grid(shuffled, 0.5);
+                std::vector<int> numbers(kCount / 2);
+                std::iota(numbers.begin(), numbers.end(), kCount / 4);
+                const CrossingGrid some = grid.some(numbers);
+                ASSERT_EQ(grid.size(), crossings.size());
+                ASSERT_EQ(some.size(), numbers.size());
+                for (const CrossingGrid* of : {&grid, &some}) {
+                    for (std::size_t i = 0; i < of->size(); ++i) {
+                        const Surface::Crossing found = (*of)[i];
+                        const auto& wanted =
+                            crossings[static_cast<std::size_t>(std::lround(found.point.x() / 0.5))];
+                        EXPECT_NEAR(found.point.x(), wanted.point.x(), 1e-7 * 0.5 * kCount);
+                        EXPECT_EQ(found.outward, wanted.outward);
+                        EXPECT_EQ(found.stands_for, wanted.stands_for);
+                        EXPECT_EQ(found.flat, wanted.flat);
+                    }
                 }
             }
-        }
 }
 
 TEST(CrossingGrid, FindsSomeAloneAsWell) {

@@ -33,7 +33,7 @@ struct FrameReport {
     std::size_t lost_crossings = 0;  ///< Grid edges that cross surface which the mesh does not hold.
     std::size_t self_intersections = 0;
     std::map<std::string, double>
-        seconds;  ///< read, carry, cover, size, relax, delaunay, convect, certify, fit, write, total.
+        seconds;  ///< read, open, carry, cover, size, relax, delaunay, convect, certify, fit, write, total.
     double peak_memory_mb = 0.0;
     std::string status = "ok";  ///< "ok", "empty", "skipped", "failed", "tolerance_not_met".
     std::string message;

@@ -20,7 +20,7 @@ public:
         : CrossingGrid(std::max(surface.resolution(), apart), surface.bounds(),
                        surface.crossing_sequence(apart)) {}
     /// `spacing` of the crossings, world units. Few different directions, as those of a lattice: 65 536 at
-    /// most. Each crossing is asked for three times.
+    /// most. Each crossing is asked for more than once.
     CrossingGrid(Surface::CrossingSequence crossings, double spacing);
     CrossingGrid(std::vector<Surface::Crossing> crossings, double spacing)
         : CrossingGrid(Surface::CrossingSequence(std::move(crossings)), spacing) {}
@@ -98,12 +98,12 @@ private:
         std::vector<std::vector<Offset>> blocks_;
         std::size_t size_ = 0;
     };
-    /// What there is to a crossing beside where it is.
+    /// What there is to a crossing besides where it is.
     struct Kind {
         std::uint32_t direction : 16;  // number among directions_
         std::uint32_t stands_for : 15, flat : 1;
     };
-    /// Of many crossings: there are more of them than of all else.
+    /// Of many crossings, in a byte each where that is enough: there are more of them than of all else.
     class Kinds {
     public:
         Kinds() = default;

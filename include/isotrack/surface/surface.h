@@ -109,7 +109,7 @@ public:
     /// Must not outlive the surface; threads may share it.
     struct CrossingSequence {
         std::size_t size = 0;
-        std::function<Crossing(std::size_t)> at;  ///< Below `size`.
+        std::function<Crossing(std::size_t)> at;  ///< Below `size`; the same whenever it is asked for.
 
         CrossingSequence() = default;
         CrossingSequence(std::size_t count, std::function<Crossing(std::size_t)> make)
