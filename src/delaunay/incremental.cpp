@@ -66,75 +66,121 @@ bool IncrementalDelaunay::in_conflict(int cell, const Vec3& p) const {
     return side != 0 ? side > 0 : in_conflict(cells_.neighbour(cell, k), p);
 }
 
-/// The number of a vertex among those of the rim.
-int IncrementalDelaunay::corner(int vertex) {
-    int& number = corner_of_[vertex + 1];  // the infinite one may be among them
-    if (number == kNone) {
-        number = static_cast<int>(corners_.size());
-        corners_.push_back(vertex);
-    }
-    return number;
+void IncrementalDelaunay::insert(int vertex, int cell) {
+    fill_hole(vertex, cell);
+    for (const int slot : freed_) blank(slot);
 }
 
-void IncrementalDelaunay::insert(int vertex, int cell) {
+/// Finds the cells in conflict with the vertex, `freed_`, and the facets around them, `rim_`.
+void IncrementalDelaunay::dig(int vertex, int cell) {
     const Vec3& p = points[vertex];
-    corner_of_.resize(points.size() + 1, kNone);
-    freed_.assign(1, cell);
-    rim_.clear();
-    // Locals, because a write to a char might be one to anything else; stale when there is a new slot.
+    // What comes next is written first and counted when it is wanted, for which branch cannot be predicted.
+    constexpr std::size_t kRoom = 64;  // more than most holes need
+    if (freed_.size() < kRoom) freed_.resize(kRoom);
+    if (rim_.size() < kRoom) rim_.resize(kRoom);
+    std::size_t freed = 0, rim = 0;
+    // Locals, because a write to a char might be one to anything else.
     char* const marks = marks_.data();
     const auto* const links = cells_.links.data();
-    marks[cell] = kConflict;
-    for (std::size_t i = 0; i < freed_.size(); ++i) {
-        const int from = freed_[i];
-        for (int k = 0; k < 4; ++k) {
-            const int other = links[from][k] >> 2;
-            char mark = marks[other];
-            if (mark == kUnseen) {
-                mark = marks[other] = in_conflict(other, p) ? kConflict : kRim;
-                if (mark == kConflict) freed_.push_back(other);
-            }
-            if (mark == kRim) rim_.push_back({from, k});
+    int* hole = freed_.data();  // links: into the cells in conflict, each from the one it was found from
+    Facet* around = rim_.data();
+    const auto cross = [&](int from, int k) {
+        const int link = links[from][k], other = link >> 2;
+        char mark = marks[other];
+        if (mark == kUnseen) {
+            const bool conflict = in_conflict(other, p);
+            mark = marks[other] = static_cast<char>(kRim - conflict);
+            hole[freed] = link;
+            freed += conflict;
         }
+        around[rim] = {from, k};
+        rim += mark == kRim;
+    };
+    static_assert(kRim - 1 == kConflict);
+    constexpr int kOthers[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
+    marks[cell] = kConflict;
+    hole[freed++] = Tetrahedra::link(cell, 0);
+    cross(cell, 0);
+    for (std::size_t i = 0; i < freed; ++i) {
+        if (freed + 3 > freed_.size()) {
+            freed_.resize(2 * freed_.size());
+            hole = freed_.data();
+        }
+        if (rim + 3 > rim_.size()) {
+            rim_.resize(2 * rim_.size());
+            around = rim_.data();
+        }
+        const int from = hole[i] >> 2, back = hole[i] & 3;
+        for (const int k : kOthers[back]) cross(from, k);
+        hole[i] = from;
     }
+    freed_.resize(freed);
+    rim_.resize(rim);
+}
 
+/// As `insert`, but what is in the slots that are freed stays there.
+void IncrementalDelaunay::fill_hole(int vertex, int cell) {
+    dig(vertex, cell);
     // A cell on every facet of the rim. They meet at the facets between the new vertex and the edges of the
     // rim, each of which two facets have, in opposite directions.
-    corners_.clear();
+    fresh_.resize(rim_.size());
+    for (int& slot : fresh_) slot = new_slot();
     const std::size_t count = rim_.size() / 2 + 2;  // of vertices on the rim, by Euler's formula
     constexpr std::size_t kMostInTable = 256;       // a vertex far outside sees half the hull
-    const bool in_table = count <= kMostInTable;
-    if (in_table && edges_.size() < count * count) edges_.resize(count * count);
-    std::unordered_map<std::size_t, int> many;
-    int* const table = edges_.data();
-    const auto edge = [&](int from, int to) -> int& {
-        const std::size_t key = count * from + to;
-        return in_table ? table[key] : many[key];
+    if (count <= kMostInTable) {
+        if (edges_.size() < count * count) edges_.resize(count * count);
+        int* const table = edges_.data();
+        connect(vertex, count, [&](int from, int to) -> int& { return table[count * from + to]; });
+    } else {
+        std::unordered_map<std::size_t, int> many;
+        connect(vertex, count, [&](int from, int to) -> int& { return many[count * from + to]; });
+    }
+    free_.insert(free_.end(), freed_.begin(), freed_.end());
+}
+
+/// Makes the cells of `fresh_`, one on every facet of the rim. `edge(a, b)` is a place for the link across
+/// the edge from the a-th of the `count` vertices on the rim to the b-th.
+template <typename Edge>
+void IncrementalDelaunay::connect(int vertex, std::size_t count, const Edge& edge) {
+    if (corner_of_.size() < points.size() + 1) corner_of_.resize(points.size() + 1, kNone);
+    corners_.resize(count);
+    on_rim_.resize(rim_.size());
+    int* const corner_of = corner_of_.data() + 1;  // the infinite vertex may be on the rim
+    int* const corners = corners_.data();
+    char* const marks = marks_.data();
+    auto* const vertices = cells_.vertices.data();
+    auto* const links = cells_.links.data();
+    int found = 0;
+    const auto corner = [&](int v) {
+        int& number = corner_of[v];
+        if (number == kNone) {
+            number = found;
+            corners[found++] = v;
+        }
+        return number;
     };
-    fresh_.clear();
-    on_rim_.clear();
-    for (const Facet& facet : rim_) {
-        const int slot = new_slot(), outside = cells_.links[facet.cell][facet.k];
-        fresh_.push_back(slot);
-        auto& v = cells_.vertices[slot];
-        v = cells_.vertices[facet.cell];
-        v[facet.k] = vertex;
-        cells_.links[slot][facet.k] = outside;
-        cells_.links[outside >> 2][outside & 3] = Tetrahedra::link(slot, facet.k);
-        marks_[outside >> 2] = kUnseen;
+    for (std::size_t i = 0; i < rim_.size(); ++i) {
+        const Facet facet = rim_[i];
         const auto& f = Tetrahedra::kFacet[facet.k];
-        auto& c = on_rim_.emplace_back();
-        for (int j = 0; j < 3; ++j) c[j] = corner(v[f[j]]);
+        const int slot = fresh_[i], outside = links[facet.cell][facet.k];
+        std::array<int, 4> v = vertices[facet.cell];
+        const std::array<int, 3> c{corner(v[f[0]]), corner(v[f[1]]), corner(v[f[2]])};
+        on_rim_[i] = c;
+        v[facet.k] = vertex;
+        vertices[slot] = v;
+        links[slot][facet.k] = outside;
+        links[outside >> 2][outside & 3] = Tetrahedra::link(slot, facet.k);
+        marks[slot] = marks[outside >> 2] = kUnseen;
         for (int j = 0; j < 3; ++j) edge(c[j], c[(j + 1) % 3]) = Tetrahedra::link(slot, f[(j + 2) % 3]);
     }
+    assert(static_cast<std::size_t>(found) == count);
     for (std::size_t i = 0; i < rim_.size(); ++i) {
         const auto& f = Tetrahedra::kFacet[rim_[i].k];
         const auto& c = on_rim_[i];
-        auto& own = cells_.links[fresh_[i]];
+        auto& own = links[fresh_[i]];
         for (int j = 0; j < 3; ++j) own[f[(j + 2) % 3]] = edge(c[(j + 1) % 3], c[j]);
     }
-    for (const int w : corners_) corner_of_[w + 1] = kNone;
-    for (const int slot : freed_) free_slot(slot);
+    for (const int w : corners_) corner_of[w] = kNone;
 }
 
 int IncrementalDelaunay::new_slot() {
@@ -154,10 +200,15 @@ int IncrementalDelaunay::new_slot() {
 }
 
 void IncrementalDelaunay::free_slot(int slot) {
+    blank(slot);
+    free_.push_back(slot);
+}
+
+/// What a slot without a cell has in it.
+void IncrementalDelaunay::blank(int slot) {
     cells_.vertices[slot].fill(Tetrahedra::kInfinite);
     for (int k = 0; k < 4; ++k) cells_.links[slot][k] = Tetrahedra::link(slot, k);
     marks_[slot] = kUnseen;
-    free_.push_back(slot);
 }
 
 /// Finds four vertices that span a volume and makes the five cells they have.
@@ -220,9 +271,10 @@ void IncrementalDelaunay::build(std::vector<int>& chosen) {
             near = cell;
             continue;
         }
-        insert(v, cell);
+        fill_hole(v, cell);
         near = fresh_.front();
     }
+    for (const int slot : free_) blank(slot);
     if (!twice.empty()) {
         std::sort(twice.begin(), twice.end());
         const auto is_twice = [&](int v) { return std::binary_search(twice.begin(), twice.end(), v); };

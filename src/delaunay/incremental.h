@@ -49,7 +49,11 @@ public:
 
 private:
     bool start(const std::vector<int>& order, std::array<int, 4>& first);
-    int corner(int vertex);
+    void dig(int vertex, int cell);
+    void fill_hole(int vertex, int cell);
+    template <typename Edge>
+    void connect(int vertex, std::size_t count, const Edge& edge);
+    void blank(int slot);
 
     Tetrahedra cells_;
     std::vector<int> free_;
