@@ -74,11 +74,12 @@ void IncrementalDelaunay::insert(int vertex, int cell) {
 /// Finds the cells in conflict with the vertex, `freed_`, and the facets around them, `rim_`.
 void IncrementalDelaunay::dig(int vertex, int cell) {
     const Vec3& p = points[vertex];
-    // What comes next is written first and counted when it is wanted, for which branch cannot be predicted.
+    // What may belong to a list is written to its end in any case, and counted if it does: a branch on it
+    // could not be predicted.
     constexpr std::size_t kRoom = 64;  // more than most holes need
     if (freed_.size() < kRoom) freed_.resize(kRoom);
     if (rim_.size() < kRoom) rim_.resize(kRoom);
-    std::size_t freed = 0, rim = 0;
+    std::size_t in_hole = 0, on_rim = 0;
     // Locals, because a write to a char might be one to anything else.
     char* const marks = marks_.data();
     const auto* const links = cells_.links.data();
@@ -90,23 +91,23 @@ void IncrementalDelaunay::dig(int vertex, int cell) {
         if (mark == kUnseen) {
             const bool conflict = in_conflict(other, p);
             mark = marks[other] = static_cast<char>(kRim - conflict);
-            hole[freed] = link;
-            freed += conflict;
+            hole[in_hole] = link;
+            in_hole += conflict;
         }
-        around[rim] = {from, k};
-        rim += mark == kRim;
+        around[on_rim] = {from, k};
+        on_rim += mark == kRim;
     };
     static_assert(kRim - 1 == kConflict);
     constexpr int kOthers[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
     marks[cell] = kConflict;
-    hole[freed++] = Tetrahedra::link(cell, 0);
+    hole[in_hole++] = Tetrahedra::link(cell, 0);  // as if found across facet 0, so that is crossed here
     cross(cell, 0);
-    for (std::size_t i = 0; i < freed; ++i) {
-        if (freed + 3 > freed_.size()) {
+    for (std::size_t i = 0; i < in_hole; ++i) {
+        if (in_hole + 3 > freed_.size()) {
             freed_.resize(2 * freed_.size());
             hole = freed_.data();
         }
-        if (rim + 3 > rim_.size()) {
+        if (on_rim + 3 > rim_.size()) {
             rim_.resize(2 * rim_.size());
             around = rim_.data();
         }
@@ -114,11 +115,11 @@ void IncrementalDelaunay::dig(int vertex, int cell) {
         for (const int k : kOthers[back]) cross(from, k);
         hole[i] = from;
     }
-    freed_.resize(freed);
-    rim_.resize(rim);
+    freed_.resize(in_hole);
+    rim_.resize(on_rim);
 }
 
-/// As `insert`, but what is in the slots that are freed stays there.
+/// As `insert`, but the slots that are freed are not blank: their cells stay there, and their marks.
 void IncrementalDelaunay::fill_hole(int vertex, int cell) {
     dig(vertex, cell);
     // A cell on every facet of the rim. They meet at the facets between the new vertex and the edges of the
@@ -154,6 +155,7 @@ void IncrementalDelaunay::connect(int vertex, std::size_t count, const Edge& edg
     const auto corner = [&](int v) {
         int& number = corner_of[v];
         if (number == kNone) {
+            assert(static_cast<std::size_t>(found) < count);
             number = found;
             corners[found++] = v;
         }
@@ -204,7 +206,7 @@ void IncrementalDelaunay::free_slot(int slot) {
     free_.push_back(slot);
 }
 
-/// What a slot without a cell has in it.
+/// Writes to a slot what one without a cell has.
 void IncrementalDelaunay::blank(int slot) {
     cells_.vertices[slot].fill(Tetrahedra::kInfinite);
     for (int k = 0; k < 4; ++k) cells_.links[slot][k] = Tetrahedra::link(slot, k);
@@ -274,7 +276,7 @@ void IncrementalDelaunay::build(std::vector<int>& chosen) {
         fill_hole(v, cell);
         near = fresh_.front();
     }
-    for (const int slot : free_) blank(slot);
+    for (const int slot : free_) blank(slot);  // the others were used again at once
     if (!twice.empty()) {
         std::sort(twice.begin(), twice.end());
         const auto is_twice = [&](int v) { return std::binary_search(twice.begin(), twice.end(), v); };

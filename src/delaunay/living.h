@@ -53,7 +53,6 @@ private:
     const std::vector<int>& star_of(int number) const;
     void place(int number, int cell);
     void note(const std::vector<int>& slots);
-    void take_out(int number);
     bool fill_star(int number);
 
     IncrementalDelaunay dt_;
