@@ -3,6 +3,7 @@
 
 #include <openvdb/openvdb.h>
 
+#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -44,11 +45,15 @@ public:
 
     std::size_t size() const { return fractions_.size(); }
     bool empty() const { return fractions_.empty(); }
-    /// In a few steps; `for_each_of` takes none.
-    CrossedEdge operator[](std::size_t i) const {
-        std::size_t part = part_at_[i / kStep];
-        while (parts_[part].end <= i) ++part;
-        return unpacked(i, parts_[part].origin);
+    /// In a few steps, which `for_each_in` takes once and `for_each_of` not at all.
+    CrossedEdge operator[](std::size_t i) const { return unpacked(i, parts_[part_of(i)].origin); }
+    /// Calls `visit(edge)` for each from `first` on, up to `end`.
+    template <typename Visit>
+    void for_each_in(std::size_t first, std::size_t end, const Visit& visit) const {
+        if (first >= end) return;
+        for (std::size_t part = part_of(first); first < end; ++part)
+            for (const std::size_t stop = std::min(end, parts_[part].end); first < stop; ++first)
+                visit(unpacked(first, parts_[part].origin));
     }
     const std::vector<Part>& parts() const { return parts_; }
     /// Calls `visit(index, edge)` for each of a part.
@@ -107,6 +112,11 @@ private:
     static_assert(sizeof(Code) == 2);
     CrossedEdge unpacked(std::size_t i, const openvdb::Coord& origin) const {
         return codes_[i].edge(origin, fractions_[i]);
+    }
+    std::size_t part_of(std::size_t i) const {
+        std::size_t part = part_at_[i / kStep];
+        while (parts_[part].end <= i) ++part;
+        return part;
     }
     static constexpr std::size_t kStep = 64;
 

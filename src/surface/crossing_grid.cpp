@@ -36,7 +36,7 @@ private:
 
 Box box_around(const Surface::CrossingSequence& crossings) {
     Box box;
-    for (std::size_t c = 0; c < crossings.size; ++c) box.extend(crossings.at(c).point);
+    crossings.for_each_in(0, crossings.size, [&](const Surface::Crossing& c) { box.extend(c.point); });
     return box;
 }
 
@@ -71,13 +71,12 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     const auto range_of_all = tbb::blocked_range<std::size_t>(0, crossings.size, Offsets::kBlock);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         std::vector<Eigen::Vector3f> known;
-        for (std::size_t c = range.begin(); c < range.end(); ++c) {
-            const Surface::Crossing crossing = crossings.at(c);
+        crossings.for_each_in(range.begin(), range.end(), [&](const Surface::Crossing& crossing) {
             if (std::find(known.begin(), known.end(), crossing.outward) == known.end())
                 directions.add(known.emplace_back(crossing.outward));
             if (crossing.stands_for != 1 || crossing.flat) all_alone.store(false, std::memory_order_relaxed);
             next[column_of(offset_of(crossing))].fetch_add(1, std::memory_order_relaxed);
-        }
+        });
     });
     for (std::size_t c = 0; c < columns; ++c) {
         first_[c + 1] = first_[c] + next[c].load(std::memory_order_relaxed);
@@ -89,8 +88,7 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
     offsets_ = Offsets(crossings.size);
     kinds_ = Kinds(crossings.size, all_alone && directions_.size() <= kMostInShort);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
-        for (std::size_t c = range.begin(); c < range.end(); ++c) {
-            const Surface::Crossing crossing = crossings.at(c);
+        crossings.for_each_in(range.begin(), range.end(), [&](const Surface::Crossing& crossing) {
             const Offset offset = offset_of(crossing);
             const std::uint32_t at = next[column_of(offset)].fetch_add(1, std::memory_order_relaxed);
             const auto direction = std::find(directions_.begin(), directions_.end(), crossing.outward);
@@ -98,9 +96,9 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
             offsets_[at] = offset;
             kinds_.set(at, {static_cast<std::uint32_t>(direction - directions_.begin()),
                             static_cast<std::uint32_t>(crossing.stands_for), crossing.flat});
-        }
+        });
     });
-    crossings.at = nullptr;  // which frees the list behind it, if there is one
+    crossings.write = nullptr;  // which frees the list behind it, if there is one
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns, 256), [&](const auto& range) {
         struct Placed {
             Offset offset;

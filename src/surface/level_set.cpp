@@ -169,8 +169,8 @@ struct LevelSet::Impl {
         bounds = tbb::parallel_reduce(
             tbb::blocked_range<std::size_t>(0, crossed.size(), 4096), Box(),
             [&](const auto& range, Box box) {
-                for (std::size_t e = range.begin(); e < range.end(); ++e)
-                    box.extend(map.to_world(crossed[e].index()));
+                crossed.for_each_in(range.begin(), range.end(),
+                                    [&](const CrossedEdge& edge) { box.extend(map.to_world(edge.index())); });
                 return box;
             },
             [](const Box& a, const Box& b) { return a.merged(b); });
@@ -192,7 +192,7 @@ struct LevelSet::Impl {
             return std::abs(reader.getValue(is_active(edge.from) ? to : edge.from)) < kNear * step;
         };
         std::size_t cut = 0;
-        for (std::size_t e = 0; e < found.size(); ++e) cut += is_cut(found[e]);
+        found.for_each_in(0, found.size(), [&](const CrossedEdge& edge) { cut += is_cut(edge); });
         if (iso >= end || (found.empty() && -iso >= end) ||
             static_cast<double>(cut) > kMostCut * static_cast<double>(found.size()))
             throw InputError(grid_label(*source) + " has no room in its band for the iso value " +
@@ -321,14 +321,18 @@ Surface::CrossingSequence LevelSet::crossing_sequence(double apart) const {
         std::vector<StandIn> some =
             thin_out(impl_->crossed, cube, cube_within(kFlat * apart, resolution(), kWidest));
         const std::size_t size = some.size();
-        return {size, [&edges, crossing, chosen = std::move(some)](std::size_t i) {
-                    Crossing result = crossing(edges[chosen[i].edge]);
-                    result.stands_for = static_cast<std::int16_t>(chosen[i].stands_for);
-                    result.flat = chosen[i].flat;
-                    return result;
+        return {size, [&edges, crossing, chosen = std::move(some)](std::size_t first, std::size_t end,
+                                                                   Crossing* to) {
+                    for (; first < end; ++first, ++to) {
+                        *to = crossing(edges[chosen[first].edge]);
+                        to->stands_for = static_cast<std::int16_t>(chosen[first].stands_for);
+                        to->flat = chosen[first].flat;
+                    }
                 }};
     }
-    return {edges.size(), [&edges, crossing](std::size_t i) { return crossing(edges[i]); }};
+    return {edges.size(), [&edges, crossing](std::size_t first, std::size_t end, Crossing* to) {
+                edges.for_each_in(first, end, [&](const CrossedEdge& edge) { *to++ = crossing(edge); });
+            }};
 }
 std::vector<Surface::Crossing> LevelSet::crossings_near(const std::vector<Vec3>& places, double reach) const {
     std::vector<Vec3> middles;
@@ -347,11 +351,11 @@ namespace {
 template <typename Found, typename MakeAdd>
 std::vector<Found> gather(const CrossedEdges& edges, const MakeAdd& make_add) {
     constexpr std::size_t kBlock = 16384;
-    return find_in_blocks<Found>(edges.size(), kBlock,
-                                 [&](std::size_t begin, std::size_t end, std::vector<Found>& found) {
-                                     auto add = make_add();
-                                     for (std::size_t e = begin; e < end; ++e) add(edges[e], found);
-                                 });
+    return find_in_blocks<Found>(
+        edges.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<Found>& found) {
+            auto add = make_add();
+            edges.for_each_in(begin, end, [&](const CrossedEdge& edge) { add(edge, found); });
+        });
 }
 
 }  // namespace

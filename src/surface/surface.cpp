@@ -90,7 +90,7 @@ std::vector<Surface::Crossing> Surface::crossings(double apart) const {
     const CrossingSequence sequence = crossing_sequence(apart);
     std::vector<Crossing> result(sequence.size);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.size(), 4096), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) result[i] = sequence.at(i);
+        sequence.write(range.begin(), range.end(), &result[range.begin()]);
     });
     return result;
 }

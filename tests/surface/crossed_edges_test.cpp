@@ -57,6 +57,19 @@ TEST(CrossedEdges, AreThoseOfDropsInLeavesOfTheirOwn) {
             EXPECT_TRUE(edge.saddles == 7 || (edge.from & ~7) == part.origin) << "in a tile";
         });
     EXPECT_EQ(visited, found.size());
+    // Six of a part: none, within one, to the end of one, over several, all.
+    const std::size_t ranges[][2] = {
+        {0, 0}, {found.size(), found.size()}, {7, 11}, {13, 18}, {5, 301}, {0, found.size()}};
+    for (const auto& [first, end] : ranges) {
+        std::size_t i = first;
+        found.for_each_in(first, end, [&](const CrossedEdge& edge) {
+            EXPECT_EQ(edge.from, found[i].from);
+            EXPECT_EQ(edge.axis, found[i].axis);
+            EXPECT_EQ(edge.fraction, found[i].fraction);
+            ++i;
+        });
+        EXPECT_EQ(i, end);
+    }
 }
 
 TEST(CrossedEdges, KnowTheirBorderAndTheirSaddles) {

@@ -27,6 +27,23 @@ Row row_of(const Surface::Crossing& c) {
     return {c.point.x(), c.point.y(), c.point.z(), c.outward.x(), c.outward.y(), c.outward.z()};
 }
 
+TEST(CrossingSequence, HasAPartOfAListInItsOrder) {
+    std::vector<Surface::Crossing> list;
+    for (int i = 0; i < 130; ++i) list.push_back({Vec3(i, 0.0, 0.0), Eigen::Vector3f::UnitX()});
+    const Surface::CrossingSequence sequence(list);
+    ASSERT_EQ(sequence.size, list.size());
+    for (const std::size_t first : {0, 1, 63, 64, 65, 130})
+        for (std::size_t end = first; end <= list.size(); ++end) {
+            std::size_t i = first;
+            sequence.for_each_in(first, end, [&](const Surface::Crossing& c) {
+                EXPECT_EQ(c.point, list[i].point);
+                ++i;
+            });
+            EXPECT_EQ(i, end);
+        }
+    Surface::CrossingSequence().for_each_in(0, 0, [](const Surface::Crossing&) { FAIL(); });
+}
+
 TEST(CrossingGrid, HoldsTheCrossingsOfASurface) {
     const auto torus = shapes::torus({0.1, 0.2, 0.3}, 1.0, 0.4, kResolution);
     std::vector<Row> wanted, found;

@@ -1,7 +1,9 @@
 // What the method knows of a surface: a value, a gradient, and the two operators made of them.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -108,18 +110,33 @@ public:
     /// Crossings that are made when they are asked for: a list of them would take more memory than all else.
     /// Must not outlive the surface; threads may share it.
     struct CrossingSequence {
+        /// Writes those from `first` on, up to `end`, one after the other; the same whenever it is asked to.
+        using Write = std::function<void(std::size_t first, std::size_t end, Crossing* to)>;
         std::size_t size = 0;
-        std::function<Crossing(std::size_t)> at;  ///< Below `size`; the same whenever it is asked for.
+        Write write;  ///< May be unset where there are none.
 
         CrossingSequence() = default;
-        CrossingSequence(std::size_t count, std::function<Crossing(std::size_t)> make)
-            : size(count), at(std::move(make)) {}
+        CrossingSequence(std::size_t count, Write make) : size(count), write(std::move(make)) {}
         /// Of a list that is there. It can be copied, has a `size()`, and a `list[i]` that becomes a
         /// crossing, which threads may ask for at once.
         template <typename List>
         explicit CrossingSequence(List list)
             : size(list.size()),
-              at([held = std::move(list)](std::size_t i) -> Crossing { return held[i]; }) {}
+              write([held = std::move(list)](std::size_t first, std::size_t end, Crossing* to) {
+                  for (; first < end; ++first) *to++ = held[first];
+              }) {}
+
+        /// Calls `visit(crossing)` for each from `first` on, up to `end`.
+        template <typename Visit>
+        void for_each_in(std::size_t first, std::size_t end, const Visit& visit) const {
+            constexpr std::size_t kAtOnce = 64;
+            Crossing some[kAtOnce];
+            for (std::size_t next; first < end; first = next) {
+                next = std::min(end, first + kAtOnce);
+                write(first, next, some);
+                for (std::size_t i = 0; i < next - first; ++i) visit(some[i]);
+            }
+        }
     };
     /// The crossings of `lattice()`: every part of the surface wider than a lattice cell holds some. Always
     /// in the same order. Of those within a cube of an edge of about `apart` some along one axis may stand
