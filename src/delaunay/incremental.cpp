@@ -79,7 +79,7 @@ void IncrementalDelaunay::dig(int vertex, int cell) {
     constexpr std::size_t kRoom = 64;  // more than most holes need
     if (freed_.size() < kRoom) freed_.resize(kRoom);
     if (rim_.size() < kRoom) rim_.resize(kRoom);
-    std::size_t in_hole = 0, on_rim = 0;
+    std::size_t in_hole = 0, in_rim = 0;
     // Locals, because a write to a char might be one to anything else.
     char* const marks = marks_.data();
     const auto* const links = cells_.links.data();
@@ -94,8 +94,8 @@ void IncrementalDelaunay::dig(int vertex, int cell) {
             hole[in_hole] = link;
             in_hole += conflict;
         }
-        around[on_rim] = {from, k};
-        on_rim += mark == kRim;
+        around[in_rim] = {from, k};
+        in_rim += mark == kRim;
     };
     static_assert(kRim - 1 == kConflict);
     constexpr int kOthers[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
@@ -107,7 +107,7 @@ void IncrementalDelaunay::dig(int vertex, int cell) {
             freed_.resize(2 * freed_.size());
             hole = freed_.data();
         }
-        if (on_rim + 3 > rim_.size()) {
+        if (in_rim + 3 > rim_.size()) {
             rim_.resize(2 * rim_.size());
             around = rim_.data();
         }
@@ -116,7 +116,7 @@ void IncrementalDelaunay::dig(int vertex, int cell) {
         hole[i] = from;
     }
     freed_.resize(in_hole);
-    rim_.resize(on_rim);
+    rim_.resize(in_rim);
 }
 
 /// As `insert`, but the slots that are freed are not blank: their cells stay there, and their marks.

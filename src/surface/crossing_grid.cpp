@@ -83,10 +83,9 @@ CrossingGrid::CrossingGrid(double spacing, const Box& box, Surface::CrossingSequ
         next[c].store(first_[c], std::memory_order_relaxed);
     }
     // Each goes to the next free place of its column, in any order: they are sorted then.
-    constexpr std::size_t kMostInShort = 256;
     directions_ = directions.take_sorted();
     offsets_ = Offsets(crossings.size);
-    kinds_ = Kinds(crossings.size, all_alone && directions_.size() <= kMostInShort);
+    kinds_ = Kinds(crossings.size, all_alone && directions_.size() <= Kinds::kMostInShort);
     tbb::parallel_for(range_of_all, [&](const auto& range) {
         crossings.for_each_in(range.begin(), range.end(), [&](const Surface::Crossing& crossing) {
             const Offset offset = offset_of(crossing);

@@ -149,8 +149,8 @@ TEST(MeshSequence, WritesOneGoodMeshPerFrame) {
         EXPECT_EQ(row.components, 1u);
         EXPECT_EQ(row.euler, 2);
         EXPECT_EQ(row.self_intersections, 0u);
-        for (const char* stage :
-             {"read", "open", "carry", "cover", "size", "relax", "delaunay", "convect", "certify", "write", "total"})
+        for (const char* stage : {"read", "open", "carry", "cover", "size", "relax", "delaunay", "convect",
+                                  "certify", "write", "total"})
             EXPECT_EQ(row.seconds.count(stage), 1u) << stage;
         EXPECT_GT(row.peak_memory_mb, 0.0);
 

@@ -107,8 +107,8 @@ private:
     class Kinds {
     public:
         Kinds() = default;
-        /// `short_form`: all stand for themselves alone, none is flat, and there are no more than 256
-        /// directions.
+        static constexpr std::size_t kMostInShort = 256;  // directions
+        /// `short_form`: all stand for themselves alone, none is flat, and there are no more directions.
         Kinds(std::size_t size, bool short_form)
             : direction_(short_form ? size : 0), whole_(short_form ? 0 : size) {}
         Kind operator[](std::size_t i) const {
