@@ -9,25 +9,23 @@
 
 namespace isotrack {
 
-/// The box of the vertices of each component of some polygons, in the order of their least vertices.
-/// `points` and `polygons` are vectors of anything with three coordinates and with `corners` indices.
-template <int corners, typename Points, typename Polygons>
-std::vector<Box> component_boxes(const Points& points, const Polygons& polygons) {
+/// The box of the vertices of each component of some triangles, in the order of their least vertices.
+inline std::vector<Box> component_boxes(const std::vector<Vec3>& points,
+                                        const std::vector<Triangle>& triangles) {
     DisjointSets vertices(points.size());
-    for (const auto& polygon : polygons)
-        for (int k = 1; k < corners; ++k)
-            vertices.join(static_cast<int>(polygon[0]), static_cast<int>(polygon[k]));
+    for (const Triangle& t : triangles)
+        for (const int v : {t[1], t[2]}) vertices.join(t[0], v);
     std::vector<int> box_of(points.size(), -1);
-    for (const auto& polygon : polygons) box_of[vertices.least(static_cast<int>(polygon[0]))] = 0;
+    for (const Triangle& t : triangles) box_of[vertices.least(t[0])] = 0;
     std::vector<Box> result;
     for (int v = 0; v < static_cast<int>(points.size()); ++v) {
         int& box = box_of[vertices.least(v)];
-        if (box < 0) continue;  // of no polygon
+        if (box < 0) continue;  // of no triangle
         if (vertices.least(v) == v) {
             box = static_cast<int>(result.size());
             result.emplace_back();
         }
-        result[box].extend(Vec3(points[v][0], points[v][1], points[v][2]));
+        result[box].extend(points[v]);
     }
     return result;
 }

@@ -44,7 +44,7 @@ public:
                 if (at_patch[v]) around_[v].push_back(static_cast<int>(t));
         const TriangleBins bins(points, triangles, surface.resolution());
         std::vector<int> near;
-        for (const Box& box : component_boxes<3>(points, patches)) {
+        for (const Box& box : component_boxes(points, patches)) {
             const std::vector<int> some = bins.meeting(box);
             near.insert(near.end(), some.begin(), some.end());
         }

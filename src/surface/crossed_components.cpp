@@ -6,6 +6,7 @@
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bitset>
 #include <cstdint>
@@ -74,6 +75,17 @@ public:
         const Bits crossed = crossed_[axis][x];
         return (crossed >> bit & 1) != 0 ? first_[axis][x] + count_of(crossed & ((Bits{1} << bit) - 1)) : -1;
     }
+    /// Calls `visit(number, from, axis)` for each edge, from its lower end.
+    template <typename Visit>
+    void for_each_edge(const Visit& visit) const {
+        for (int axis = 0; axis < 3; ++axis)
+            for (int x = 0; x < kDim; ++x) {
+                int number = first_[axis][x];
+                for_each_bit(crossed_[axis][x], [&](int bit) {
+                    visit(number++, origin_.offsetBy(x, bit / kDim, bit % kDim), axis);
+                });
+            }
+    }
 
 private:
     Coord origin_;
@@ -138,7 +150,7 @@ public:
         }
     }
 
-private:
+    /// The number that a set goes by.
     int least(int i) {
         for (int up = parent(i); up != i; up = parent(i)) {
             parent_[i].store(parent(up), std::memory_order_relaxed);  // another of its set, whoever looks
@@ -146,6 +158,8 @@ private:
         }
         return i;
     }
+
+private:
     int parent(int i) const { return parent_[i].load(std::memory_order_relaxed); }
 
     std::vector<std::atomic<int>> parent_;
@@ -229,37 +243,93 @@ private:
     std::size_t joined_ = 0;
 };
 
+/// All crossed edges of a tree, put together.
+class CrossedComponents {
+public:
+    explicit CrossedComponents(const openvdb::FloatTree& tree)
+        : blocks_(mixed_blocks(tree)), edges_(number(blocks_)), sets_(edges_) {
+        std::unordered_map<Coord, const Block*, std::hash<Coord>>
+            at;  // in blocks: low bits count in the hash
+        at.reserve(blocks_.size());
+        for (const Block& block : blocks_) at.emplace(block.origin() >> kLog2Dim, &block);
+        const std::size_t joined = tbb::parallel_reduce(
+            range(), std::size_t{0},
+            [&](const auto& some, std::size_t joined_before) {
+                TreeReader reader(tree);
+                LeafSigns signs;
+                for (std::size_t b = some.begin(); b < some.end(); ++b) {
+                    const Coord& origin = blocks_[b].origin();
+                    const Block* above[3];
+                    for (int axis = 0; axis < 3; ++axis) {
+                        const auto next = at.find((origin >> kLog2Dim) + unit(axis));
+                        above[axis] = next == at.end() ? nullptr : next->second;
+                    }
+                    const LeafSides sides(origin, reader.probeConstLeaf(origin), reader, signs);
+                    joined_before += FaceJoiner(blocks_[b], above, sides, reader, sets_).join_all();
+                }
+                return joined_before;
+            },
+            std::plus<std::size_t>());
+        count_ = edges_ - joined;
+    }
+    std::size_t count() const { return count_; }
+
+    /// Calls `visit(component, from, axis)` for each edge of some blocks, from its lower end; a component
+    /// goes by one of the numbers below that of all edges.
+    template <typename Visit>
+    void for_each_edge(const tbb::blocked_range<std::size_t>& blocks, const Visit& visit) {
+        for (std::size_t b = blocks.begin(); b < blocks.end(); ++b)
+            blocks_[b].for_each_edge(
+                [&](int edge, const Coord& from, int axis) { visit(sets_.least(edge), from, axis); });
+    }
+    /// All blocks.
+    tbb::blocked_range<std::size_t> range() const { return {0, blocks_.size(), kBlocks}; }
+
+private:
+    /// Returns how many edges there are.
+    static std::size_t number(std::vector<Block>& blocks) {
+        int edges = 0;
+        for (Block& block : blocks) edges = block.number_from(edges);
+        return static_cast<std::size_t>(edges);
+    }
+
+    std::vector<Block> blocks_;
+    std::size_t edges_;
+    SharedSets sets_;
+    std::size_t count_ = 0;
+};
+
 }  // namespace
 
 std::size_t count_components(const openvdb::FloatTree& tree) {
-    std::vector<Block> blocks = mixed_blocks(tree);
-    std::unordered_map<Coord, const Block*, std::hash<Coord>> at;  // in blocks: low bits count in the hash
-    at.reserve(blocks.size());
-    int edges = 0;
-    for (Block& block : blocks) {
-        edges = block.number_from(edges);
-        at.emplace(block.origin() >> kLog2Dim, &block);
-    }
-    SharedSets sets(static_cast<std::size_t>(edges));
-    const std::size_t joined = tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, blocks.size(), kBlocks), std::size_t{0},
-        [&](const auto& range, std::size_t count) {
-            TreeReader reader(tree);
-            LeafSigns signs;
-            for (std::size_t b = range.begin(); b < range.end(); ++b) {
-                const Coord& origin = blocks[b].origin();
-                const Block* above[3];
-                for (int axis = 0; axis < 3; ++axis) {
-                    const auto next = at.find((origin >> kLog2Dim) + unit(axis));
-                    above[axis] = next == at.end() ? nullptr : next->second;
-                }
-                const LeafSides sides(origin, reader.probeConstLeaf(origin), reader, signs);
-                count += FaceJoiner(blocks[b], above, sides, reader, sets).join_all();
-            }
-            return count;
-        },
-        std::plus<std::size_t>());
-    return static_cast<std::size_t>(edges) - joined;
+    return CrossedComponents(tree).count();
+}
+
+std::vector<Box> boxes_of_components(const openvdb::FloatTree& tree, const AffineMap& map) {
+    CrossedComponents components(tree);
+    using Boxes = std::unordered_map<int, Box>;
+    tbb::enumerable_thread_specific<Boxes> of_threads;
+    tbb::parallel_for(components.range(), [&](const auto& some) {
+        Boxes& boxes = of_threads.local();
+        TreeReader reader(tree);
+        components.for_each_edge(some, [&](int component, const Coord& from, int axis) {
+            const double low = reader.getValue(from), high = reader.getValue(from + unit(axis));
+            const Vec3 way = std::clamp(low / (low - high), 0.0, 1.0) * Vec3::Unit(axis);
+            boxes[component].extend(map.to_world(Vec3(from.x(), from.y(), from.z()) + way));
+        });
+    });
+    Boxes all;
+    for (const Boxes& boxes : of_threads)
+        for (const auto& [component, box] : boxes) all[component].extend(box);
+    std::vector<Box> result;
+    for (const auto& [component, box] : all) result.push_back(box);
+    const auto corners = [](const Box& box) {
+        return std::array{box.min().x(), box.min().y(), box.min().z(),
+                          box.max().x(), box.max().y(), box.max().z()};
+    };
+    std::sort(result.begin(), result.end(),
+              [&](const Box& a, const Box& b) { return corners(a) < corners(b); });
+    return result;
 }
 
 }  // namespace isotrack

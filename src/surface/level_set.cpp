@@ -13,7 +13,6 @@
 #include <limits>
 #include <mutex>
 
-#include "component_boxes.h"
 #include "find_in_blocks.h"
 #include "isotrack/error.h"
 #include "surface/affine_map.h"
@@ -21,6 +20,7 @@
 #include "surface/chosen_edges.h"
 #include "surface/crossed_components.h"
 #include "surface/crossed_edges.h"
+#include "surface/grid_part.h"
 #include "surface/grid_probe.h"
 #include "surface/grid_values.h"
 #include "surface/inactive_tiles.h"
@@ -33,7 +33,6 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
 
-constexpr double kFewNodes = 0.25;  // of the active ones
 constexpr double kLeastBand = 0.1;  // voxels
 constexpr double kMostCut = 0.6;    // of the crossings, by the end of the band: shreds otherwise
 
@@ -400,28 +399,20 @@ const PolygonMesh& LevelSet::Impl::all_quadrangles() const {
     return quadrangles_;
 }
 std::optional<std::vector<Box>> LevelSet::lattice_components() const {
-    const PolygonMesh& all = impl_->all_quadrangles();
-    return component_boxes<4>(all.points, all.quads);
+    return boxes_of_components(impl_->grid->constTree(), impl_->map);
 }
 TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reach) const {
-    // Around few places their nodes alone are looked at, and two more to each side.
-    const Vec3 most = lattice().inverse().linear().cwiseAbs() * Vec3::Constant(reach) + Vec3::Constant(2.0);
-    if (!impl_->has_quadrangles() && static_cast<double>(places.size()) * (2.0 * most + Vec3::Ones()).prod() <
-                                         kFewNodes * static_cast<double>(impl_->active_voxels)) {
-        const FloatGrid::Ptr grid = impl_->grid->copyWithNewTree();
-        auto to = grid->getAccessor();
-        const auto from = impl_->grid->getConstAccessor();
-        for (const Vec3& place : places) {
-            const Vec3 middle = lattice().inverse() * place;
-            const auto corner = [&](double side) {
-                const Vec3 p = (middle + side * most).array().round();
-                return Coord(static_cast<int>(p.x()), static_cast<int>(p.y()), static_cast<int>(p.z()));
-            };
-            for (auto node = openvdb::CoordBBox(corner(-1.0), corner(1.0)).begin(); node; ++node)
-                to.setValue(*node, from.getValue(*node));
-        }
-        const PolygonMesh some = quadrangles_of(*grid, static_cast<float>(impl_->map.voxel_size));
-        return lattice_mesh_of(quadrangles_near(places, reach, some), *this);
+    if (!impl_->has_quadrangles()) {
+        // Two nodes more to each side.
+        const Vec3 nodes =
+            lattice().inverse().linear().cwiseAbs() * Vec3::Constant(reach) + Vec3::Constant(2.0);
+        std::vector<Vec3> middles;
+        for (const Vec3& place : places) middles.push_back(impl_->map.to_index(place));
+        if (const FloatGrid::Ptr part = part_around(*impl_->grid, middles, nodes))
+            return lattice_mesh_of(
+                quadrangles_near(places, reach,
+                                 quadrangles_of(*part, static_cast<float>(impl_->map.voxel_size))),
+                *this);
     }
     return lattice_mesh_of(quadrangles_near(places, reach, impl_->all_quadrangles()), *this);
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/LevelSetSphere.h>
 
 #include <algorithm>
 #include <array>
@@ -366,7 +367,6 @@ TEST(LatticeMesh, FacesOutwardInMirroredAndStretchedLattices) {
     }
 }
 
-/// Few places are looked at alone, more in the whole grid: 729 nodes around each of them here, of 9261.
 void expect_part_of_the_whole(const LevelSet& level_set, const std::vector<Vec3>& places, double reach) {
     const auto triangles_in = [&](const TriangleMesh& mesh) {
         std::multiset<std::array<double, 9>> result;
@@ -400,6 +400,62 @@ TEST(LatticeMesh, OfSomePlacesIsAPartOfTheWhole) {
     for (const Vec3& voxel : {Vec3(1, 1, 1), Vec3(-1, 1.5, 0.8)}) {
         const Vec3 top = Vec3(4.1, 4.8, 5.3).cwiseProduct(voxel);
         expect_part_of_the_whole(cube_of(ball, voxel), {top}, 2.0);
+    }
+}
+
+TEST(LatticeMesh, OfAPartOfALargeGridIsAPartOfTheWhole) {
+    const float voxel = 0.5f;
+    const openvdb::Vec3f centre(0.1f, -0.2f, 0.3f);
+    const LevelSet ball(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(20.0f, centre, voxel));
+    expect_part_of_the_whole(ball, {Vec3(20.1, -0.2, 0.3), Vec3(0.1, -0.2, -19.7)}, 3.0);
+}
+
+TEST(LatticeComponents, AreWhereTheirCrossingsAre) {
+    // Balls in a lattice that is turned and stretched.
+    struct Ball {
+        Vec3 centre;
+        double radius;
+    };
+    const std::vector<Ball> balls = {{{-6, -6, 0}, 5.0}, {{5, 4, 3}, 3.3}, {{4, -4, -5}, 0.9}};
+    const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+    const Mat3 to_world = turn * Vec3(0.25, 0.3, 0.2).asDiagonal();
+    openvdb::Mat4d transform = openvdb::Mat4d::identity();
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) transform[row][column] = to_world(column, row);
+    auto grid = openvdb::FloatGrid::create(1.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(transform));
+    auto values = grid->getAccessor();
+    for (auto c = openvdb::CoordBBox(openvdb::Coord(-75), openvdb::Coord(75)).begin(); c; ++c) {
+        const Vec3 p = to_world * Vec3((*c).x(), (*c).y(), (*c).z());
+        double distance = 1.0;
+        for (const Ball& ball : balls) distance = std::min(distance, (p - ball.centre).norm() - ball.radius);
+        if (std::abs(distance) < 1.0)
+            values.setValue(*c, static_cast<float>(distance));
+        else if (distance < 0.0)
+            values.setValueOff(*c, -1.0f);
+    }
+    const LevelSet level_set(grid);
+    const auto boxes = level_set.lattice_components();
+    ASSERT_TRUE(boxes.has_value());
+    ASSERT_EQ(boxes->size(), balls.size());
+    std::vector<Box> expected(balls.size());
+    for (const auto& crossing : level_set.crossings()) {
+        const auto nearest = std::min_element(balls.begin(), balls.end(), [&](const Ball& a, const Ball& b) {
+            const auto off = [&](const Ball& ball) {
+                return (crossing.point - ball.centre).norm() - ball.radius;
+            };
+            return off(a) < off(b);
+        });
+        expected[nearest - balls.begin()].extend(crossing.point);
+    }
+    for (std::size_t b = 0; b < balls.size(); ++b) {
+        const auto found = std::find_if(boxes->begin(), boxes->end(),
+                                        [&](const Box& box) { return box.contains(balls[b].centre); });
+        ASSERT_NE(found, boxes->end()) << b;
+        EXPECT_LT((found->min() - expected[b].min()).norm(), 1e-6) << b;
+        EXPECT_LT((found->max() - expected[b].max()).norm(), 1e-6) << b;
+        EXPECT_NEAR(found->sizes().maxCoeff(), 2.0 * balls[b].radius, 0.1) << b;
     }
 }
 

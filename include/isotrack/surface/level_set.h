@@ -26,8 +26,8 @@ struct LevelSetOptions {
 /// voxels and tiles carry a sign, a background of zero means outside, NaN and infinity mean outside, minus
 /// infinity inside, and a surface that runs into the border of its voxels is closed there by a flat cap one
 /// voxel beyond the last of them, where volumeToMesh would put it. Immutable after construction; const
-/// members may be called from any number of threads. What `lattice_components` makes, some 40 bytes for each
-/// crossed edge, stays as long as this does: a `lattice_mesh` takes little then.
+/// members may be called from any number of threads. What a `lattice_mesh` around so many places needs that it
+/// is made of the whole grid, some 40 bytes for each crossed edge, stays as long as this does.
 class LevelSet : public Surface {
 public:
     /// \throws InputError if the grid is neither float nor double, if its transform is not linear, or if it

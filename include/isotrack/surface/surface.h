@@ -177,7 +177,7 @@ public:
     virtual std::optional<long> lattice_euler() const { return std::nullopt; }
     /// And how many components it has.
     virtual std::optional<std::size_t> lattice_component_count() const { return std::nullopt; }
-    /// They themselves, by boxes that hold the vertices of one in a cell each, for a part of the price.
+    /// They themselves, each by the box of its crossings, for a part of the price.
     virtual std::optional<std::vector<Box>> lattice_components() const { return std::nullopt; }
 };
 
