@@ -236,10 +236,11 @@ private:
 };
 
 /// Flags for the vertices of a part: it is nearer to what goes than to what stays, and not in the seam.
-std::vector<char> coming_vertices(const Part& part, const TriangleBins& mesh, const std::vector<int>& gone,
+std::vector<char> coming_vertices(const Part& part, const std::vector<Vec3>& points,
+                                  const std::vector<int>& gone,
                                   const std::vector<std::pair<int, int>>& border, PatchSource& source) {
-    source.look_beside(part.vertices, mesh);
-    const Seam seam(border, mesh.points(), kSeam * source.spacing());
+    source.look_beside(part.vertices);
+    const Seam seam(border, points, kSeam * source.spacing());
     std::vector<char> result;
     for (const int v : part.vertices) {
         const int beside = source.beside(v);
@@ -324,7 +325,6 @@ PatchSource::PatchSource(TriangleMesh mesh, double spacing)
       bins_(mesh_.points, mesh_.triangles, spacing),
       normal_(mesh_.points.size(), Vec3::Zero()),
       beside_(mesh_.points.size()) {
-    forget();
     for (const Triangle& t : mesh_.triangles) {
         const Vec3 normal = area_vector(t, mesh_.points);
         for (const int v : t) normal_[v] += normal;
@@ -332,7 +332,15 @@ PatchSource::PatchSource(TriangleMesh mesh, double spacing)
     for (Vec3& n : normal_) n.normalize();
 }
 
-void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBins& mesh) {
+void PatchSource::look_at(const TriangleBins& mesh) {
+    looked_at_ = &mesh;
+    boxes_.emplace(mesh.points(), mesh.triangles(), std::vector<char>(mesh.triangles().size(), 1));
+    for (auto& beside : beside_) beside.store(kNotLookedFor, std::memory_order_relaxed);
+}
+
+void PatchSource::look_beside(const std::vector<int>& vertices) {
+    constexpr double kFirst = 0.5;  // spacings: most find what they look for there
+    const TriangleBins& mesh = *looked_at_;
     const std::vector<Vec3>& points = mesh.points();
     const double farthest = kMargin * spacing_;
     tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t i) {
@@ -340,32 +348,26 @@ void PatchSource::look_beside(const std::vector<int>& vertices, const TriangleBi
         if (beside(v) != kNotLookedFor) return;
         const Vec3& p = mesh_.points[v];
         double nearest[2] = {kFar, kFar};
-        int at[2] = {-1, -1};      // the nearest that faces another way, and the same way
-        std::array<int, 16> seen;  // the first: a triangle is in several cubes
-        std::size_t count = 0;
-        mesh.for_each_near(
-            p,
-            [&](int other) {
-                if (std::find(seen.begin(), seen.begin() + count, other) != seen.begin() + count) return;
-                if (count < seen.size()) seen[count++] = other;
+        int at[2] = {-1, -1};  // the nearest that faces another way, and the same way; of equals the first
+        for (double distance = kFirst * spacing_; boxes_->leaf_count() > 0; distance *= 2.0) {
+            const double distance2 = distance * distance;
+            const auto look = [&](int other) {
                 const double to_box = mesh.box_of(other).squaredExteriorDistance(p);
                 // Another way counts only while none is known that faces the same way.
-                if (to_box >= nearest[1]) return;
+                if (to_box > std::min(nearest[1], distance2)) return;
                 const Triangle& t = mesh.triangles()[other];
                 const bool same = area_vector(t, points).dot(normal_[v]) > 0.0;
-                if (!same && (at[1] >= 0 || to_box >= nearest[0])) return;
+                if (!same && (at[1] >= 0 || to_box > nearest[0])) return;
                 const double d = squared_distance(p, points[t[0]], points[t[1]], points[t[2]]);
-                if (d < nearest[same]) nearest[same] = d, at[same] = other;
-            },
-            [&](double distance) {
-                return nearest[1] <= distance * distance || (at[0] >= 0 && distance >= farthest);
-            });
+                if (d > distance2) return;  // there may be others as near
+                if (d < nearest[same] || (d == nearest[same] && other < at[same]))
+                    nearest[same] = d, at[same] = other;
+            };
+            boxes_->for_each_meeting(Box(p - Vec3::Constant(distance), p + Vec3::Constant(distance)), look);
+            if (at[1] >= 0 || (at[0] >= 0 && distance >= farthest)) break;
+        }
         beside_[v].store(at[1] >= 0 ? at[1] : at[0], std::memory_order_relaxed);
     });
-}
-
-void PatchSource::forget() {
-    for (auto& beside : beside_) beside.store(kNotLookedFor, std::memory_order_relaxed);
 }
 
 Vec3 area_vector(const Triangle& t, const std::vector<Vec3>& at) {
@@ -409,7 +411,7 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
     for (const int t : gone) bounds.extend(mesh.box_of(t));
     const Vec3 margin = Vec3::Constant(kMargin * source.spacing());
     Part part = part_within(Box(bounds.min() - margin, bounds.max() + margin), source.bins());
-    const auto comes = coming_vertices(part, mesh, gone, border, source);
+    const auto comes = coming_vertices(part, points, gone, border, source);
     // What comes and the border have numbers of their own, the border's behind the others.
     const auto own = part.vertices.size();
     std::vector<Vec3> at, normals;

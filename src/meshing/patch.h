@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isotrack/types.h"
+#include "meshing/box_tree.h"
 #include "meshing/triangle_bins.h"
 
 namespace isotrack {
@@ -22,7 +23,7 @@ struct Patch {
 };
 
 /// The mesh that patches come from. It remembers what it finds of the one they are for. Threads may share it,
-/// but for `forget`.
+/// but for `look_at`.
 class PatchSource {
 public:
     /// `spacing`: the length of an edge. Closed and manifold around what will go.
@@ -34,12 +35,12 @@ public:
     const TriangleBins& bins() const { return bins_; }
     const Vec3& normal(int vertex) const { return normal_[vertex]; }  ///< Unit, or zero.
 
-    /// Finds, by several threads, for each of some vertices the triangle of `mesh` that is nearest, among
+    /// From now on patches are for this mesh, which must outlive that. Uses TBB inside.
+    void look_at(const TriangleBins& mesh);
+    /// Finds, by several threads, for each of some vertices the triangle of that mesh that is nearest, among
     /// those that face the same way if any of them is near; -1 if there is none.
-    void look_beside(const std::vector<int>& vertices, const TriangleBins& mesh);
+    void look_beside(const std::vector<int>& vertices);
     int beside(int vertex) const { return beside_[vertex].load(std::memory_order_relaxed); }  ///< As found.
-    /// `mesh` is another now.
-    void forget();
 
 private:
     TriangleMesh mesh_;
@@ -47,6 +48,10 @@ private:
     TriangleBins bins_;
     std::vector<Vec3> normal_;
     std::vector<std::atomic<int>> beside_;  // whoever looks finds the same
+    // The mesh that is looked at: its triangles are of all sizes, too many where they are small for bins of
+    // one.
+    const TriangleBins* looked_at_ = nullptr;
+    std::optional<BoxTree> boxes_;
 };
 
 /// The triangles of a mesh within `reach` of a place, and those around where their border would be pinched.
@@ -62,7 +67,7 @@ bool have_same_numbers(const std::vector<int>& some, const TriangleBins& mesh, c
 /// to them come, less a seam about as wide as its spacing; strips of triangles that face as the source does,
 /// if any do, fill the seam from each loop of the one border to one of the other, and what they cross of what
 /// comes is left out. nullopt where the loops do not match. The mesh must be closed and manifold, and so is
-/// what it becomes, but for edges that it may have twice; it may cross itself.
+/// what it becomes, but for edges that it may have twice; it may cross itself. `source` must look at it.
 std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source);
 
 /// Whether a closed, oriented manifold stays one with a patch: around each vertex of what comes and of what

@@ -23,20 +23,6 @@ public:
     /// Those whose boxes meet this one, ascending.
     std::vector<int> meeting(const Box& box) const;
 
-    /// Calls `visit(triangle)` with those in the cube of a place and others near, then with those in more
-    /// cubes, and so on, some more than once: until `is_enough(distance)` holds for a distance within which
-    /// all were visited, or all were.
-    template <typename Visit, typename IsEnough>
-    void for_each_near(const Vec3& place, const Visit& visit, const IsEnough& is_enough) const {
-        constexpr double kFirst = 0.25;  // most find what they look for there
-        for (double distance = kFirst * size_;; distance *= 2.0) {
-            const Range range =
-                range_of(Box(place - Vec3::Constant(distance), place + Vec3::Constant(distance)));
-            for_each_in(range, visit);
-            if (is_enough(distance) || ((range.from == 0).all() && (range.to == count_ - 1).all())) return;
-        }
-    }
-
 private:
     struct Range {
         Eigen::Array3i from, to;  // inclusive

@@ -40,11 +40,9 @@ std::size_t count_within(const Box& box, const std::vector<Vec3>& places) {
 /// Patches of one mesh that have no vertex in common.
 class Batch {
 public:
-    Batch(MeshTrials& trials, PatchSource& lattice, const Surface& surface)
-        : trials_(trials),
-          lattice_(lattice),
-          margin_(kMargin * surface.resolution()),
-          bins_(trials.mesh().vertices, trials.mesh().carved.triangles, 0.5 * surface.resolution()) {}
+    /// `bins`: of the mesh as it is, which `lattice` looks at.
+    Batch(MeshTrials& trials, const TriangleBins& bins, PatchSource& lattice, const Surface& surface)
+        : trials_(trials), bins_(bins), lattice_(lattice), margin_(kMargin * surface.resolution()) {}
 
     /// Around some of these places.
     void make(const std::vector<Vec3>& places, double reach) {
@@ -136,9 +134,9 @@ private:
         }
     }
     MeshTrials& trials_;
+    const TriangleBins& bins_;
     PatchSource& lattice_;
     const double margin_;
-    const TriangleBins bins_;  // of the mesh as it is
     std::vector<Candidate> candidates_;
 };
 
@@ -167,15 +165,20 @@ std::size_t mend_in_batches(MeshTrials& trials, const Surface& surface) {
     const auto places_now = [&] { return apart(trials.failing_places(), kApart * resolution); };
     std::vector<Vec3> places = places_now();
     PatchSource lattice(surface.lattice_mesh(places, kLatticeReach * resolution), resolution);
+    std::optional<TriangleBins> bins;  // of the mesh as it is
     std::size_t count = 0;
     for (const double reach : kReaches) {
         if (places.empty()) break;
-        Batch batch(trials, lattice, surface);
+        if (!bins) {
+            bins.emplace(trials.mesh().vertices, trials.mesh().carved.triangles, 0.5 * resolution);
+            lattice.look_at(*bins);
+        }
+        Batch batch(trials, *bins, lattice, surface);
         batch.make(places, reach * resolution);
         const std::size_t put_in = batch.put_in();
         if (put_in == 0) continue;
         count += put_in;
-        lattice.forget();
+        bins.reset();
         places = places_now();
     }
     return count;

@@ -238,7 +238,6 @@ public:
     /// What is known of the mesh, which is another now.
     void forget() {
         bins_.reset();
-        lattice_.forget();
         change_.clear();
         try_again();
     }
@@ -306,7 +305,10 @@ private:
     }
     const TriangleBins& bins_of_mesh() {
         const FrameMesh& mesh = trials_.mesh();
-        if (!bins_) bins_.emplace(mesh.vertices, mesh.carved.triangles, 0.5 * resolution_);
+        if (!bins_) {
+            bins_.emplace(mesh.vertices, mesh.carved.triangles, 0.5 * resolution_);
+            lattice_.look_at(*bins_);
+        }
         return *bins_;
     }
 

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <string>
@@ -47,7 +48,61 @@ std::optional<Patch> patch_around(const Vec3& place, double reach, const Triangl
                                   const TriangleMesh& fine, double spacing) {
     const TriangleBins bins(mesh.points, mesh.triangles, spacing);
     PatchSource source(fine, spacing);
+    source.look_at(bins);
     return patch_for(triangles_around(place, reach, bins), bins, source);
+}
+
+TEST(PatchSource, LooksBesideForTheNearestThatFacesTheSameWay) {
+    // A shell with large triangles outside and small ones inside, and places between.
+    TriangleMesh shell = support::icosphere(2);
+    const TriangleMesh inner = support::icosphere(5);
+    constexpr double kInner = 0.9;
+    const auto outer_count = static_cast<int>(shell.points.size());
+    for (const Vec3& p : inner.points) shell.points.push_back(kInner * p);
+    for (const auto& [i, j, k] : inner.triangles)
+        shell.triangles.push_back({outer_count + i, outer_count + k, outer_count + j});
+    const TriangleBins bins(shell.points, shell.triangles, 0.1);
+    struct Nearest {
+        double same = std::numeric_limits<double>::infinity(), other = same;
+    };
+    const auto distance2 = [&](const Vec3& p, std::size_t t) {
+        const auto& [i, j, k] = shell.triangles[t];
+        return squared_distance(p, shell.points[i], shell.points[j], shell.points[k]);
+    };
+    const auto is_same = [&](const Vec3& way, std::size_t t) {
+        return area_vector(shell.triangles[t], shell.points).dot(way) > 0.0;
+    };
+    for (const double radius : {0.92, 1.02}) {
+        TriangleMesh between = support::icosphere(3);
+        for (Vec3& p : between.points) p *= radius;
+        for (const double spacing : {0.1, 0.002}) {
+            PatchSource source(between, spacing);
+            source.look_at(bins);
+            std::vector<int> all(between.points.size());
+            std::iota(all.begin(), all.end(), 0);
+            source.look_beside(all);
+            for (const int v : all) {
+                const Vec3& p = between.points[v];
+                Nearest nearest;
+                for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
+                    double& least = is_same(source.normal(v), t) ? nearest.same : nearest.other;
+                    least = std::min(least, distance2(p, t));
+                }
+                ASSERT_GE(source.beside(v), 0);
+                const auto beside = static_cast<std::size_t>(source.beside(v));
+                // With the smaller spacing those outside are not near what is between.
+                const bool is_outer = spacing > 0.01 || radius > 1.0;
+                ASSERT_EQ(is_same(source.normal(v), beside), is_outer) << radius << ' ' << spacing;
+                ASSERT_EQ(distance2(p, beside), is_outer ? nearest.same : nearest.other);
+            }
+        }
+    }
+    const TriangleMesh none;
+    const TriangleBins no_bins(none.points, none.triangles, 0.1);
+    PatchSource source(support::icosphere(1), 0.1);
+    source.look_at(no_bins);
+    source.look_beside({0});
+    EXPECT_EQ(source.beside(0), -1);
 }
 
 TEST(Patch, BringsAFinerPartOfTheSameSphere) {

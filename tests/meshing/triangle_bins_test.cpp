@@ -46,48 +46,27 @@ TEST_P(InTriangleBins, ThoseThatMeetABoxAreFound) {
     EXPECT_GT(found, 200u);
 }
 
-TEST_P(InTriangleBins, TheNearestIsFound) {
-    const TriangleBins bins(mesh.points, mesh.triangles, GetParam());
-    for (int round = 0; round < 200; ++round) {
-        const Vec3 p = place();
-        const auto distance2 = [&](std::size_t t) {
-            const auto& [i, j, k] = mesh.triangles[t];
-            return squared_distance(p, mesh.points[i], mesh.points[j], mesh.points[k]);
-        };
-        double expected = std::numeric_limits<double>::infinity(), found = expected;
-        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) expected = std::min(expected, distance2(t));
-        bins.for_each_near(
-            p, [&](int t) { found = std::min(found, distance2(static_cast<std::size_t>(t))); },
-            [&](double distance) { return found <= distance * distance; });
-        EXPECT_EQ(found, expected);
-    }
-}
-
 INSTANTIATE_TEST_SUITE_P(OfSize, InTriangleBins, ::testing::Values(1e-3, 0.1, 1.0, 100.0));
 
 TEST(TriangleBins, AreTheSameAtAnyNumberOfThreads) {
     const TriangleMesh mesh = support::icosphere(6);  // of several blocks
-    std::vector<std::vector<int>> visited;
+    const Vec3 place(0.5, 0.6, 0.7);
+    std::vector<std::vector<int>> meeting;
     for (const std::size_t threads : {1, 4}) {
         const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
         tbb::task_arena(static_cast<int>(threads)).execute([&] {
             const TriangleBins bins(mesh.points, mesh.triangles, 0.3);
-            visited.emplace_back();
-            bins.for_each_near(
-                {0.5, 0.6, 0.7}, [&](int t) { visited.back().push_back(t); },
-                [](double distance) { return distance > 0.5; });
+            meeting.push_back(bins.meeting(Box(place - Vec3::Constant(0.8), place + Vec3::Constant(0.8))));
         });
     }
-    EXPECT_GT(visited[0].size(), 10000u);
-    EXPECT_EQ(visited[0], visited[1]);
+    EXPECT_GT(meeting[0].size(), 10000u);
+    EXPECT_EQ(meeting[0], meeting[1]);
 }
 
 TEST(TriangleBins, MayBeEmpty) {
     const TriangleMesh none;
     const TriangleBins bins(none.points, none.triangles, 1.0);
     EXPECT_TRUE(bins.meeting(Box(Vec3(-1, -1, -1), Vec3(1, 1, 1))).empty());
-    bins.for_each_near(
-        Vec3::Zero(), [](int) { ADD_FAILURE(); }, [](double) { return false; });
 }
 
 }  // namespace
