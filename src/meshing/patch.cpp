@@ -339,34 +339,43 @@ void PatchSource::look_at(const TriangleBins& mesh) {
 }
 
 void PatchSource::look_beside(const std::vector<int>& vertices) {
-    constexpr double kFirst = 0.5;  // spacings: most find what they look for there
+    constexpr double kLeast = 0.25;   // spacings: that it looks around at first
+    constexpr double kLikely = 1.25;  // times as far as what is beside the vertex before, which is near
+    constexpr std::size_t kGrain = 64;
     const TriangleBins& mesh = *looked_at_;
     const std::vector<Vec3>& points = mesh.points();
     const double farthest = kMargin * spacing_;
-    tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t i) {
-        const int v = vertices[i];
-        if (beside(v) != kNotLookedFor) return;
+    const auto find = [&](int v, double& likely) {
         const Vec3& p = mesh_.points[v];
         double nearest[2] = {kFar, kFar};
         int at[2] = {-1, -1};  // the nearest that faces another way, and the same way; of equals the first
-        for (double distance = kFirst * spacing_; boxes_->leaf_count() > 0; distance *= 2.0) {
-            const double distance2 = distance * distance;
+        for (double distance = likely; boxes_->leaf_count() > 0; distance *= 2.0) {
             const auto look = [&](int other) {
                 const double to_box = mesh.box_of(other).squaredExteriorDistance(p);
-                // Another way counts only while none is known that faces the same way.
-                if (to_box > std::min(nearest[1], distance2)) return;
+                if (to_box > std::max(nearest[0], nearest[1])) return;
                 const Triangle& t = mesh.triangles()[other];
                 const bool same = area_vector(t, points).dot(normal_[v]) > 0.0;
-                if (!same && (at[1] >= 0 || to_box > nearest[0])) return;
+                if (to_box > nearest[same]) return;
                 const double d = squared_distance(p, points[t[0]], points[t[1]], points[t[2]]);
-                if (d > distance2) return;  // there may be others as near
                 if (d < nearest[same] || (d == nearest[same] && other < at[same]))
                     nearest[same] = d, at[same] = other;
             };
             boxes_->for_each_meeting(Box(p - Vec3::Constant(distance), p + Vec3::Constant(distance)), look);
-            if (at[1] >= 0 || (at[0] >= 0 && distance >= farthest)) break;
+            // What is farther may have been seen, but not all of it.
+            const double seen2 = distance * distance;
+            const bool same = nearest[1] <= std::max(farthest * farthest, nearest[0]);
+            const double least2 = same ? nearest[1] : std::max(farthest * farthest, nearest[0]);
+            if (!(least2 <= seen2)) continue;
+            likely = std::max(kLeast * spacing_, kLikely * std::sqrt(nearest[same]));
+            return at[same];
         }
-        beside_[v].store(at[1] >= 0 ? at[1] : at[0], std::memory_order_relaxed);
+        return -1;
+    };
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices.size(), kGrain), [&](const auto& range) {
+        double likely = kLeast * spacing_;
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+            if (auto& beside = beside_[vertices[i]]; beside.load(std::memory_order_relaxed) == kNotLookedFor)
+                beside.store(find(vertices[i], likely), std::memory_order_relaxed);
     });
 }
 

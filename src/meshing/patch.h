@@ -38,7 +38,7 @@ public:
     /// From now on patches are for this mesh, which must outlive that. Uses TBB inside.
     void look_at(const TriangleBins& mesh);
     /// Finds, by several threads, for each of some vertices the triangle of that mesh that is nearest, among
-    /// those that face the same way if any of them is near; -1 if there is none.
+    /// those that face the same way if one of them is within two spacings; -1 if there is none.
     void look_beside(const std::vector<int>& vertices);
     int beside(int vertex) const { return beside_[vertex].load(std::memory_order_relaxed); }  ///< As found.
 

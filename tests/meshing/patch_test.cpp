@@ -72,10 +72,11 @@ TEST(PatchSource, LooksBesideForTheNearestThatFacesTheSameWay) {
     const auto is_same = [&](const Vec3& way, std::size_t t) {
         return area_vector(shell.triangles[t], shell.points).dot(way) > 0.0;
     };
-    for (const double radius : {0.92, 1.02}) {
+    int count[2] = {0, 0};
+    for (const double radius : {0.92, 0.94, 1.02}) {
         TriangleMesh between = support::icosphere(3);
         for (Vec3& p : between.points) p *= radius;
-        for (const double spacing : {0.1, 0.002}) {
+        for (const double spacing : {0.1, 0.025, 0.002}) {
             PatchSource source(between, spacing);
             source.look_at(bins);
             std::vector<int> all(between.points.size());
@@ -90,13 +91,16 @@ TEST(PatchSource, LooksBesideForTheNearestThatFacesTheSameWay) {
                 }
                 ASSERT_GE(source.beside(v), 0);
                 const auto beside = static_cast<std::size_t>(source.beside(v));
-                // With the smaller spacing those outside are not near what is between.
-                const bool is_outer = spacing > 0.01 || radius > 1.0;
-                ASSERT_EQ(is_same(source.normal(v), beside), is_outer) << radius << ' ' << spacing;
-                ASSERT_EQ(distance2(p, beside), is_outer ? nearest.same : nearest.other);
+                const double near = 2.0 * spacing;
+                const bool faces_the_same_way = nearest.same <= std::max(near * near, nearest.other);
+                ASSERT_EQ(is_same(source.normal(v), beside), faces_the_same_way) << radius << ' ' << spacing;
+                ASSERT_EQ(distance2(p, beside), faces_the_same_way ? nearest.same : nearest.other);
+                ++count[faces_the_same_way];
             }
         }
     }
+    EXPECT_GT(count[0], 100);
+    EXPECT_GT(count[1], 100);
     const TriangleMesh none;
     const TriangleBins no_bins(none.points, none.triangles, 0.1);
     PatchSource source(support::icosphere(1), 0.1);
