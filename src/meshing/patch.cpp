@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
@@ -325,6 +326,8 @@ PatchSource::PatchSource(TriangleMesh mesh, double spacing)
       bins_(mesh_.points, mesh_.triangles, spacing),
       normal_(mesh_.points.size(), Vec3::Zero()),
       beside_(mesh_.points.size()) {
+    assert(spacing > 0.0);
+    forget();
     for (const Triangle& t : mesh_.triangles) {
         const Vec3 normal = area_vector(t, mesh_.points);
         for (const int v : t) normal_[v] += normal;
@@ -335,12 +338,17 @@ PatchSource::PatchSource(TriangleMesh mesh, double spacing)
 void PatchSource::look_at(const TriangleBins& mesh) {
     looked_at_ = &mesh;
     boxes_.emplace(mesh.points(), mesh.triangles(), std::vector<char>(mesh.triangles().size(), 1));
+    forget();
+}
+
+void PatchSource::forget() {
     for (auto& beside : beside_) beside.store(kNotLookedFor, std::memory_order_relaxed);
 }
 
 void PatchSource::look_beside(const std::vector<int>& vertices) {
     constexpr double kLeast = 0.25;   // spacings: that it looks around at first
     constexpr double kLikely = 1.25;  // times as far as what is beside the vertex before, which is near
+    constexpr double kRounding = 1.0 + 1e-12;  // ample: what is found must not depend on the order
     constexpr std::size_t kGrain = 64;
     const TriangleBins& mesh = *looked_at_;
     const std::vector<Vec3>& points = mesh.points();
@@ -352,10 +360,10 @@ void PatchSource::look_beside(const std::vector<int>& vertices) {
         for (double distance = likely; boxes_->leaf_count() > 0; distance *= 2.0) {
             const auto look = [&](int other) {
                 const double to_box = mesh.box_of(other).squaredExteriorDistance(p);
-                if (to_box > std::max(nearest[0], nearest[1])) return;
+                if (to_box > kRounding * std::max(nearest[0], nearest[1])) return;
                 const Triangle& t = mesh.triangles()[other];
                 const bool same = area_vector(t, points).dot(normal_[v]) > 0.0;
-                if (to_box > nearest[same]) return;
+                if (to_box > kRounding * nearest[same]) return;
                 const double d = squared_distance(p, points[t[0]], points[t[1]], points[t[2]]);
                 if (d < nearest[same] || (d == nearest[same] && other < at[same]))
                     nearest[same] = d, at[same] = other;
@@ -410,6 +418,7 @@ bool have_same_numbers(const std::vector<int>& some, const TriangleBins& mesh, c
 }
 
 std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source) {
+    assert(source.looks_at(mesh));
     if (gone.empty()) return std::nullopt;
     const std::vector<Vec3>& points = mesh.points();
     Patch patch;

@@ -26,7 +26,7 @@ struct Patch {
 /// but for `look_at`.
 class PatchSource {
 public:
-    /// `spacing`: the length of an edge. Closed and manifold around what will go.
+    /// `spacing`: the length of an edge, > 0. Closed and manifold around what will go.
     PatchSource(TriangleMesh mesh, double spacing);
     PatchSource(const PatchSource&) = delete;
     PatchSource& operator=(const PatchSource&) = delete;
@@ -37,12 +37,15 @@ public:
 
     /// From now on patches are for this mesh, which must outlive that. Uses TBB inside.
     void look_at(const TriangleBins& mesh);
+    bool looks_at(const TriangleBins& mesh) const { return looked_at_ == &mesh; }
     /// Finds, by several threads, for each of some vertices the triangle of that mesh that is nearest, among
     /// those that face the same way if one of them is within two spacings; -1 if there is none.
     void look_beside(const std::vector<int>& vertices);
     int beside(int vertex) const { return beside_[vertex].load(std::memory_order_relaxed); }  ///< As found.
 
 private:
+    void forget();
+
     TriangleMesh mesh_;
     double spacing_;
     TriangleBins bins_;

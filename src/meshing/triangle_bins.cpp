@@ -56,16 +56,18 @@ TriangleBins::TriangleBins(const std::vector<Vec3>& points, const std::vector<Tr
     members_.resize(first_.back());
     for_each_cube(
         [&](int t, std::size_t cube) { members_[next[cube].fetch_add(1, std::memory_order_relaxed)] = t; });
-    parallel_for_each(cubes, kBlock, [&](std::size_t cube) {
-        std::sort(members_.begin() + first_[cube], members_.begin() + first_[cube + 1]);
-    });
 }
 
 std::vector<int> TriangleBins::meeting(const Box& box) const {
     std::vector<int> result;
-    for_each_in(range_of(box), [&](int t) {
-        if (box_of(t).intersects(box)) result.push_back(t);
-    });
+    const Range range = range_of(box);
+    for (int x = range.from.x(); x <= range.to.x(); ++x)
+        for (int y = range.from.y(); y <= range.to.y(); ++y)
+            for (int z = range.from.z(); z <= range.to.z(); ++z) {
+                const std::size_t cube = number(x, y, z);
+                for (int m = first_[cube]; m < first_[cube + 1]; ++m)
+                    if (box_of(members_[m]).intersects(box)) result.push_back(members_[m]);
+            }
     std::sort(result.begin(), result.end());
     result.erase(std::unique(result.begin(), result.end()), result.end());
     return result;

@@ -28,16 +28,6 @@ private:
         Eigen::Array3i from, to;  // inclusive
     };
     Range range_of(const Box& box) const;
-    template <typename Visit>
-    void for_each_in(const Range& range, const Visit& visit) const {
-        for (int x = range.from.x(); x <= range.to.x(); ++x)
-            for (int y = range.from.y(); y <= range.to.y(); ++y)
-                for (int z = range.from.z(); z <= range.to.z(); ++z) {
-                    const std::size_t cube = number(x, y, z);
-                    std::for_each(members_.begin() + first_[cube], members_.begin() + first_[cube + 1],
-                                  visit);
-                }
-    }
     std::size_t number(int x, int y, int z) const {
         return (static_cast<std::size_t>(x) * count_.y() + y) * count_.z() + z;
     }

@@ -366,6 +366,11 @@ std::optional<std::size_t> Inspector::lattice_component_count() {
     return *component_count_;
 }
 
+const std::optional<std::vector<Box>>& Inspector::lattice_components() {
+    if (!components_) components_ = surface_.lattice_components();
+    return *components_;
+}
+
 void Inspector::inspect_topology(const FrameMesh& mesh, Inspection& inspection) {
     prepare_topology();
     inspection.topology = lattice_topology(mesh.vertices, mesh.carved.triangles, *sides_);

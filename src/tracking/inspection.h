@@ -96,6 +96,7 @@ public:
     void prepare_topology();
     /// The surface's, counted once.
     std::optional<std::size_t> lattice_component_count();
+    const std::optional<std::vector<Box>>& lattice_components();
     /// The topology of the mesh just inspected. The first time its faults are doubtful places; what more
     /// particles there do not mend then they seldom do.
     void inspect_topology(const FrameMesh& mesh, Inspection& inspection);
@@ -138,6 +139,7 @@ private:
     std::vector<std::vector<int>> missed_;  // of each of distances_, ascending
     std::optional<LatticeSides> sides_;
     std::optional<std::optional<std::size_t>> component_count_;  // none: not counted yet
+    std::optional<std::optional<std::vector<Box>>> components_;  // none: not looked for yet
     bool looked_at_topology_ = false;
 };
 

@@ -342,7 +342,7 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     MeshNumbers numbers = numbers_of(trials.mesh());
     long now = astray(numbers);
     if (now == 0) return 0;
-    const auto wanted = surface.lattice_components();
+    const auto& wanted = trials.inspector().lattice_components();
     if (!wanted) return 0;
     std::unique_ptr<Patcher> patcher;
     const auto make_lattice = [&](const std::vector<Vec3>& some, double reach) {

@@ -101,12 +101,40 @@ TEST(PatchSource, LooksBesideForTheNearestThatFacesTheSameWay) {
     }
     EXPECT_GT(count[0], 100);
     EXPECT_GT(count[1], 100);
-    const TriangleMesh none;
-    const TriangleBins no_bins(none.points, none.triangles, 0.1);
-    PatchSource source(support::icosphere(1), 0.1);
+}
+
+TEST(PatchSource, FindsTheSameInAnyOrderAndTheFirstOfEquals) {
+    // At a vertex all triangles around are as near.
+    const TriangleMesh sphere = support::icosphere(3);
+    const TriangleBins bins(sphere.points, sphere.triangles, 0.1);
+    PatchSource at_once(sphere, 0.1), one_by_one(sphere, 0.1);
+    for (PatchSource* source : {&at_once, &one_by_one}) source->look_at(bins);
+    std::vector<int> all(sphere.points.size());
+    std::iota(all.begin(), all.end(), 0);
+    at_once.look_beside(all);
+    std::reverse(all.begin(), all.end());
+    for (const int v : all) one_by_one.look_beside({v});
+    for (const int v : all) {
+        const auto first =
+            std::find_if(sphere.triangles.begin(), sphere.triangles.end(),
+                         [&](const Triangle& t) { return std::find(t.begin(), t.end(), v) != t.end(); });
+        ASSERT_EQ(at_once.beside(v), first - sphere.triangles.begin());
+        ASSERT_EQ(one_by_one.beside(v), at_once.beside(v));
+    }
+}
+
+TEST(PatchSource, LooksAtAnotherMesh) {
+    const TriangleMesh none, sphere = support::icosphere(1);
+    const TriangleBins no_bins(none.points, none.triangles, 0.1), bins(sphere.points, sphere.triangles, 0.1);
+    PatchSource source(sphere, 0.1);
     source.look_at(no_bins);
     source.look_beside({0});
     EXPECT_EQ(source.beside(0), -1);
+    source.look_at(bins);
+    EXPECT_TRUE(source.looks_at(bins));
+    EXPECT_FALSE(source.looks_at(no_bins));
+    source.look_beside({0});
+    EXPECT_GE(source.beside(0), 0);
 }
 
 TEST(Patch, BringsAFinerPartOfTheSameSphere) {

@@ -5,11 +5,8 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include <algorithm>
-#include <limits>
 #include <random>
 
-#include "meshing/triangle_distance.h"
 #include "support/meshes.h"
 
 namespace isotrack {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
+#include <limits>
 #include <vector>
 
 namespace isotrack {
@@ -38,8 +39,23 @@ TEST(GridPart, HasWhatTheGridHasAround) {
     EXPECT_GT(inside_tiles, 0);
 }
 
+TEST(GridPart, HasTilesOfAnyValue) {
+    const openvdb::FloatGrid::Ptr grid = ball();
+    const openvdb::Coord low(80, 0, 0), far(96, 0, 0);
+    grid->tree().addTile(1, low, 7.0f, true);
+    grid->tree().addTile(1, far, 8.0f, false);
+    const openvdb::FloatGrid::Ptr part = part_around(*grid, {Vec3(84.0, 4.0, 4.0)}, Vec3::Constant(14.0));
+    ASSERT_TRUE(part);
+    for (auto node = openvdb::CoordBBox({70, -10, -10}, {98, 18, 18}).begin(); node; ++node) {
+        ASSERT_EQ(part->tree().getValue(*node), grid->tree().getValue(*node)) << *node;
+        ASSERT_EQ(part->tree().isValueOn(*node), grid->tree().isValueOn(*node)) << *node;
+    }
+}
+
 TEST(GridPart, IsNoneOfALargePart) {
     const openvdb::FloatGrid::Ptr grid = ball();
+    for (const double reach : {1e4, 1e8, 1e12, 1e300, std::numeric_limits<double>::infinity()})
+        EXPECT_FALSE(part_around(*grid, {Vec3::Zero()}, Vec3::Constant(reach))) << reach;
     EXPECT_FALSE(part_around(*grid, {Vec3(53.0, -2.0, 1.0)}, Vec3::Constant(50.0)));
     std::vector<Vec3> all_over;
     for (auto node = grid->cbeginValueOn(); node; ++node) {
@@ -52,7 +68,8 @@ TEST(GridPart, IsNoneOfALargePart) {
 
 TEST(GridPart, IsEmptyAwayFromTheGridAndWithoutPlaces) {
     const openvdb::FloatGrid::Ptr grid = ball();
-    for (const std::vector<Vec3>& places : {std::vector<Vec3>(), {Vec3(500.0, 0.0, 0.0)}}) {
+    for (const std::vector<Vec3>& places :
+         {std::vector<Vec3>(), {Vec3(500.0, 0.0, 0.0)}, {Vec3(0.0, -1e11, 0.0)}}) {
         const openvdb::FloatGrid::Ptr part = part_around(*grid, places, Vec3::Constant(5.0));
         ASSERT_TRUE(part);
         EXPECT_TRUE(part->tree().empty());

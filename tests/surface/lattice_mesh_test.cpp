@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -28,17 +30,17 @@ constexpr int kHalf = 10;
 
 /// Values of a function at the nodes of a cube, outside around it.
 template <typename Value>
-LevelSet cube_of(const Value& value, const Vec3& voxel = Vec3::Ones()) {
+LevelSet cube_of(const Value& value, const Vec3& voxel = Vec3::Ones(), int half = kHalf) {
     auto grid = openvdb::FloatGrid::create(3.0f);
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     openvdb::Mat4d to_world = openvdb::Mat4d::identity();
     for (int k = 0; k < 3; ++k) to_world[k][k] = voxel[k];
     grid->setTransform(openvdb::math::Transform::createLinearTransform(to_world));
     auto values = grid->getAccessor();
-    for (int x = -kHalf; x <= kHalf; ++x)
-        for (int y = -kHalf; y <= kHalf; ++y)
-            for (int z = -kHalf; z <= kHalf; ++z) {
-                const bool border = std::max({std::abs(x), std::abs(y), std::abs(z)}) == kHalf;
+    for (int x = -half; x <= half; ++x)
+        for (int y = -half; y <= half; ++y)
+            for (int z = -half; z <= half; ++z) {
+                const bool border = std::max({std::abs(x), std::abs(y), std::abs(z)}) == half;
                 values.setValue({x, y, z},
                                 border ? 3.0f : static_cast<float>(std::clamp(value(x, y, z), -3.0, 3.0)));
             }
@@ -46,13 +48,15 @@ LevelSet cube_of(const Value& value, const Vec3& voxel = Vec3::Ones()) {
 }
 
 /// Inside nodes strewn at random: faces of all kinds, crumbs, tunnels.
-LevelSet strewn(unsigned seed, double share) {
+LevelSet strewn(unsigned seed, double share, int half = kHalf) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> uniform(0.0, 1.0);
-    return cube_of([&](int, int, int) {
-        const double size = 0.02 + 0.96 * uniform(random);
-        return uniform(random) < share ? -size : size;
-    });
+    return cube_of(
+        [&](int, int, int) {
+            const double size = 0.02 + 0.96 * uniform(random);
+            return uniform(random) < share ? -size : size;
+        },
+        Vec3::Ones(), half);
 }
 
 const std::vector<Vec3> kAll = {Vec3::Zero()};
@@ -395,6 +399,9 @@ TEST(LatticeMesh, OfSomePlacesIsAPartOfTheWhole) {
     const std::vector<Vec3> places = {Vec3(-4, 2, 1), Vec3(5, 5, -6)};
     expect_part_of_the_whole(strewn(3, 0.4), places, 3.0);
     expect_part_of_the_whole(strewn(3, 0.4), places, 2.0);
+    // Of so large a grid a part is taken: see `part_around`.
+    for (const double share : {0.1, 0.4, 0.7})
+        expect_part_of_the_whole(strewn(3, share, 30), {Vec3(-4, 2, 1), Vec3(11, 17, -14)}, 6.0);
     // Inside and out, where the nodes far away are not as those around.
     const auto ball = [](int x, int y, int z) { return Vec3(x, y, z).norm() - 8.3; };
     for (const Vec3& voxel : {Vec3(1, 1, 1), Vec3(-1, 1.5, 0.8)}) {
@@ -439,6 +446,18 @@ TEST(LatticeComponents, AreWhereTheirCrossingsAre) {
     const auto boxes = level_set.lattice_components();
     ASSERT_TRUE(boxes.has_value());
     ASSERT_EQ(boxes->size(), balls.size());
+    for (std::size_t b = 1; b < boxes->size(); ++b)
+        EXPECT_LT((*boxes)[b - 1].min().x(), (*boxes)[b].min().x());
+    for (const std::size_t threads : {1, 4}) {
+        const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+        const auto again = tbb::task_arena(static_cast<int>(threads)).execute([&] {
+            return level_set.lattice_components();
+        });
+        for (std::size_t b = 0; b < boxes->size(); ++b) {
+            EXPECT_EQ((*again)[b].min(), (*boxes)[b].min());
+            EXPECT_EQ((*again)[b].max(), (*boxes)[b].max());
+        }
+    }
     std::vector<Box> expected(balls.size());
     for (const auto& crossing : level_set.crossings()) {
         const auto nearest = std::min_element(balls.begin(), balls.end(), [&](const Ball& a, const Ball& b) {

@@ -26,8 +26,8 @@ struct LevelSetOptions {
 /// voxels and tiles carry a sign, a background of zero means outside, NaN and infinity mean outside, minus
 /// infinity inside, and a surface that runs into the border of its voxels is closed there by a flat cap one
 /// voxel beyond the last of them, where volumeToMesh would put it. Immutable after construction; const
-/// members may be called from any number of threads. What a `lattice_mesh` around so many places needs that it
-/// is made of the whole grid, some 40 bytes for each crossed edge, stays as long as this does.
+/// members may be called from any number of threads. A `lattice_mesh` around places all over the grid, and a
+/// `light_lattice_mesh`, keep some 40 bytes for each crossed edge as long as this lives, for the next one.
 class LevelSet : public Surface {
 public:
     /// \throws InputError if the grid is neither float nor double, if its transform is not linear, or if it
