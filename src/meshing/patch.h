@@ -51,8 +51,8 @@ private:
     TriangleBins bins_;
     std::vector<Vec3> normal_;
     std::vector<std::atomic<int>> beside_;  // whoever looks finds the same
-    // The mesh that is looked at: its triangles are of all sizes, too many where they are small for bins of
-    // one.
+    // The mesh that is looked at. Its triangles are of all sizes: where they are small, bins of one size have
+    // too many of them.
     const TriangleBins* looked_at_ = nullptr;
     std::optional<BoxTree> boxes_;
 };

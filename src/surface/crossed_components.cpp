@@ -248,8 +248,8 @@ class CrossedComponents {
 public:
     explicit CrossedComponents(const openvdb::FloatTree& tree)
         : blocks_(mixed_blocks(tree)), edges_(number(blocks_)), sets_(edges_) {
-        std::unordered_map<Coord, const Block*, std::hash<Coord>>
-            at;  // in blocks: low bits count in the hash
+        // By their places in blocks: low bits count in the hash.
+        std::unordered_map<Coord, const Block*, std::hash<Coord>> at;
         at.reserve(blocks_.size());
         for (const Block& block : blocks_) at.emplace(block.origin() >> kLog2Dim, &block);
         const std::size_t joined = tbb::parallel_reduce(

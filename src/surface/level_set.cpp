@@ -403,7 +403,8 @@ std::optional<std::vector<Box>> LevelSet::lattice_components() const {
 }
 TriangleMesh LevelSet::lattice_mesh(const std::vector<Vec3>& places, double reach) const {
     if (!impl_->has_quadrangles()) {
-        // Two nodes more to each side: those of a cell at the end, and those beyond that tell how it is joined.
+        // Two nodes more to each side: those of a cell at the end, and those beyond, which tell how it is
+        // joined.
         const Vec3 nodes =
             lattice().inverse().linear().cwiseAbs() * Vec3::Constant(reach) + Vec3::Constant(2.0);
         std::vector<Vec3> middles;
