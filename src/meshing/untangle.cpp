@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 #include "surface/far_value.h"
 
@@ -49,36 +50,58 @@ bool is_complex(const CellLabels& labels, const std::vector<int>& ring) {
     return changes > 2;
 }
 
-/// The cells around a vertex, split into sets of one label that hang together through facets at the vertex.
-std::vector<std::vector<int>> fans_of(const Tetrahedra& cells, const CellLabels& labels, int vertex,
-                                      int cell) {
-    std::vector<std::vector<int>> fans;
-    std::vector<int> star{cell};
-    for (std::size_t s = 0; s < star.size(); ++s)
-        for (int k = 0; k < 4; ++k) {
-            if (cells.vertices[star[s]][k] == vertex) continue;
-            const int next = cells.neighbour(star[s], k);
-            if (std::find(star.begin(), star.end(), next) == star.end()) star.push_back(next);
-        }
-    std::vector<char> taken(star.size(), 0);
-    for (std::size_t s = 0; s < star.size(); ++s) {
-        if (taken[s]) continue;
-        taken[s] = 1;
-        std::vector<int> fan{star[s]};
-        for (std::size_t f = 0; f < fan.size(); ++f)
-            for (int k = 0; k < 4; ++k) {
-                if (cells.vertices[fan[f]][k] == vertex) continue;
-                const int next = cells.neighbour(fan[f], k);
-                const auto at =
-                    static_cast<std::size_t>(std::find(star.begin(), star.end(), next) - star.begin());
-                if (taken[at] || labels[next] != labels[fan[0]]) continue;
-                taken[at] = 1;
-                fan.push_back(next);
-            }
-        fans.push_back(std::move(fan));
+/// Splits stars: the cells around a vertex into fans, sets of one label that hang together through facets at
+/// the vertex.
+class StarSplitter {
+public:
+    explicit StarSplitter(const Tetrahedra& cells) : cells_(cells), place_(cells.vertices.size(), -1) {}
+
+    /// The star of `vertex`, which `cell` has.
+    void look_at(int vertex, int cell) {
+        for (const int c : star_) place_[c] = -1;
+        star_.clear();
+        vertex_ = vertex;
+        const auto add = [&](int c) {
+            place_[c] = static_cast<int>(star_.size());
+            star_.push_back(c);
+        };
+        add(cell);
+        for (std::size_t s = 0; s < star_.size(); ++s)
+            for_each_beside(star_[s], [&](int next) {
+                if (place_[next] < 0) add(next);
+            });
     }
-    return fans;
-}
+    /// Calls `take(fan)` with those of the star in turn.
+    template <typename Take>
+    void for_each_fan(const CellLabels& labels, const Take& take) {
+        taken_.assign(star_.size(), 0);
+        for (std::size_t s = 0; s < star_.size(); ++s) {
+            if (taken_[s]) continue;
+            taken_[s] = 1;
+            fan_.assign(1, star_[s]);
+            for (std::size_t f = 0; f < fan_.size(); ++f)
+                for_each_beside(fan_[f], [&](int next) {
+                    if (taken_[place_[next]] || labels[next] != labels[star_[s]]) return;
+                    taken_[place_[next]] = 1;
+                    fan_.push_back(next);
+                });
+            take(fan_);
+        }
+    }
+
+private:
+    template <typename Visit>
+    void for_each_beside(int cell, const Visit& visit) const {
+        for (int k = 0; k < 4; ++k)
+            if (cells_.vertices[cell][k] != vertex_) visit(cells_.neighbour(cell, k));
+    }
+
+    const Tetrahedra& cells_;
+    int vertex_ = -1;
+    std::vector<int> star_, fan_;
+    std::vector<int> place_;  // of each cell in the star; -1: it is not there
+    std::vector<char> taken_;
+};
 
 /// Where tangles may be: edges and vertices, each with a cell that has it.
 struct Places {
@@ -108,14 +131,20 @@ Places places_of(const Tetrahedra& cells, const std::vector<int>& of) {
     return result;
 }
 
-std::size_t count_tangles(const Tetrahedra& cells, const CellLabels& labels, const Places& places) {
+std::size_t count_tangles(const Tetrahedra& cells, const CellLabels& labels, const Places& places,
+                          StarSplitter& splitter) {
     std::vector<int> ring;
     std::size_t count = 0;
     for (const Edge& e : places.edges) {
         ring_of(cells, e, ring);
         count += is_complex(labels, ring);
     }
-    for (const auto& [v, c] : places.vertices) count += fans_of(cells, labels, v, c).size() > 2;
+    for (const auto& [v, c] : places.vertices) {
+        int fans = 0;
+        splitter.look_at(v, c);
+        splitter.for_each_fan(labels, [&](const std::vector<int>&) { ++fans; });
+        count += fans > 2;
+    }
     return count;
 }
 
@@ -123,7 +152,9 @@ std::size_t count_tangles(const Tetrahedra& cells, const CellLabels& labels, con
 
 bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec3>& points,
               const Surface& surface, const CarvedSurface& carved, std::optional<double> detail) {
+    if (carved.complex_edges.empty() && carved.pinched.empty()) return false;
     const auto probe = surface.probe();
+    StarSplitter splitter(cells);
     const double limit = kUncertain * detail.value_or(surface.resolution());
     struct Run {
         double certainty;
@@ -148,9 +179,9 @@ bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec
         for (const Run& run : runs) {
             if (run.certainty > limit) break;
             const Places places = places_of(cells, run.cells);
-            const std::size_t before = count_tangles(cells, labels, places);
+            const std::size_t before = count_tangles(cells, labels, places, splitter);
             for (const int c : run.cells) labels[c] = !labels[c];
-            if (count_tangles(cells, labels, places) < before) {
+            if (count_tangles(cells, labels, places, splitter) < before) {
                 changed.insert(changed.end(), run.cells.begin(), run.cells.end());
                 return;
             }
@@ -180,10 +211,12 @@ bool untangle(CellLabels& labels, const Tetrahedra& cells, const std::vector<Vec
             relabel(runs);
         }
         for (const auto& [v, cell] : places.vertices) {
-            const auto fans = fans_of(cells, labels, v, cell);
+            std::vector<std::vector<int>> fans;
+            splitter.look_at(v, cell);
+            splitter.for_each_fan(labels, [&](const std::vector<int>& fan) { fans.push_back(fan); });
             if (fans.size() <= 2) continue;
             std::vector<Run> runs;
-            for (const auto& fan : fans) runs.push_back(run_of(fan));
+            for (auto& fan : fans) runs.push_back(run_of(std::move(fan)));
             relabel(runs);
         }
         if (changed.empty()) break;
