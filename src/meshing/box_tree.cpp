@@ -52,13 +52,23 @@ std::vector<int> order_along_curve(const std::vector<Vec3>& points, const std::v
 }  // namespace
 
 BoxTree::BoxTree(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
-                 const std::vector<char>& some) {
+                 const std::vector<char>& some)
+    : BoxTree(points, triangles, order_along_curve(points, triangles, some), 1) {}
+
+BoxTree::BoxTree(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                 const std::vector<int>& order, int run_length) {
     Box bounds;
     for (const Vec3& p : points) bounds.extend(p);
     if (!bounds.isEmpty()) origin_ = bounds.min();
 
+    const auto box_of_run = [&](int run) {
+        const std::size_t begin = static_cast<std::size_t>(run) * static_cast<std::size_t>(run_length);
+        Box box = box_of(points, triangles[begin]);
+        for (std::size_t t = begin + 1; t < std::min(begin + run_length, triangles.size()); ++t)
+            box.extend(box_of(points, triangles[t]));
+        return box;
+    };
     constexpr std::size_t kLeafGrain = 64;
-    const std::vector<int> order = order_along_curve(points, triangles, some);
     leaves_.resize((order.size() + kPerLeaf - 1) / kPerLeaf);
     while (first_ < leaves_.size()) first_ *= 2, ++levels_;
     const Bounds empty{{kInfinite, kInfinite, kInfinite}, {-kInfinite, -kInfinite, -kInfinite}};
@@ -71,7 +81,7 @@ BoxTree::BoxTree(const std::vector<Vec3>& points, const std::vector<Triangle>& t
             Bounds box = empty;
             if (m < leaf.count) {
                 leaf.triangle[m] = order[begin + m];
-                box = rounded(box_of(points, triangles[leaf.triangle[m]]));
+                box = rounded(box_of_run(leaf.triangle[m]));
             }
             Bounds& all = bounds_[first_ + l];
             for (int axis = 0; axis < 3; ++axis) {
@@ -88,6 +98,12 @@ BoxTree::BoxTree(const std::vector<Vec3>& points, const std::vector<Triangle>& t
             bounds_[node].low[axis] = std::min(one.low[axis], other.low[axis]);
             bounds_[node].high[axis] = std::max(one.high[axis], other.high[axis]);
         }
+}
+
+std::vector<int> BoxTree::order() const {
+    std::vector<int> result;
+    for (const Leaf& leaf : leaves_) result.insert(result.end(), leaf.triangle, leaf.triangle + leaf.count);
+    return result;
 }
 
 BoxTree::Bounds BoxTree::rounded(const Box& box) const {

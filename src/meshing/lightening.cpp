@@ -12,8 +12,8 @@
 #include "isotrack/meshing/self_intersections.h"
 #include "meshing/replacing.h"
 #include "meshing/sharpness.h"
-#include "meshing/triangle_bins.h"
 #include "meshing/triangle_boxes.h"
+#include "meshing/triangle_tree.h"
 
 namespace isotrack {
 namespace {
@@ -42,10 +42,10 @@ public:
         for (std::size_t t = 0; t < triangles.size(); ++t)
             for (const int v : triangles[t])
                 if (at_patch[v]) around_[v].push_back(static_cast<int>(t));
-        const TriangleBins bins(points, triangles, surface.resolution());
+        const TriangleTree tree(points, triangles);
         std::vector<int> near;
         for (const Box& box : component_boxes(points, patches)) {
-            const std::vector<int> some = bins.meeting(box);
+            const std::vector<int> some = tree.meeting(box);
             near.insert(near.end(), some.begin(), some.end());
         }
         std::sort(near.begin(), near.end());

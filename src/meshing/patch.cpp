@@ -189,7 +189,7 @@ struct Part {
     std::vector<Triangle> triangles;
 };
 
-Part part_within(const Box& bounds, const TriangleBins& mesh) {
+Part part_within(const Box& bounds, const TriangleTree& mesh) {
     Part result;
     std::unordered_map<int, int> number;
     for (const int t : mesh.meeting(bounds)) {
@@ -246,7 +246,7 @@ std::vector<char> coming_vertices(const Part& part, const std::vector<Vec3>& poi
     for (const int v : part.vertices) {
         const int beside = source.beside(v);
         result.push_back(std::binary_search(gone.begin(), gone.end(), beside) &&
-                         !seam.is_near(source.bins().points()[v]));
+                         !seam.is_near(source.tree().points()[v]));
     }
     return result;
 }
@@ -323,7 +323,7 @@ constexpr int kNotLookedFor = -2;
 PatchSource::PatchSource(TriangleMesh mesh, double spacing)
     : mesh_(std::move(mesh)),
       spacing_(spacing),
-      bins_(mesh_.points, mesh_.triangles, spacing),
+      tree_(TriangleTree::in_order(mesh_.points, mesh_.triangles)),
       normal_(mesh_.points.size(), Vec3::Zero()),
       beside_(mesh_.points.size()) {
     assert(spacing > 0.0);
@@ -335,9 +335,8 @@ PatchSource::PatchSource(TriangleMesh mesh, double spacing)
     for (Vec3& n : normal_) n.normalize();
 }
 
-void PatchSource::look_at(const TriangleBins& mesh) {
+void PatchSource::look_at(const TriangleTree& mesh) {
     looked_at_ = &mesh;
-    boxes_.emplace(mesh.points(), mesh.triangles(), std::vector<char>(mesh.triangles().size(), 1));
     forget();
 }
 
@@ -350,14 +349,14 @@ void PatchSource::look_beside(const std::vector<int>& vertices) {
     constexpr double kLikely = 1.25;  // times as far as what is beside the vertex before, which is near
     constexpr double kRounding = 1.0 + 1e-12;  // ample: what is found must not depend on the order
     constexpr std::size_t kGrain = 64;
-    const TriangleBins& mesh = *looked_at_;
+    const TriangleTree& mesh = *looked_at_;
     const std::vector<Vec3>& points = mesh.points();
     const double farthest = kMargin * spacing_;
     const auto find = [&](int v, double& likely) {
         const Vec3& p = mesh_.points[v];
         double nearest[2] = {kFar, kFar};
         int at[2] = {-1, -1};  // the nearest that faces another way, and the same way; of equals the first
-        for (double distance = likely; boxes_->leaf_count() > 0; distance *= 2.0) {
+        for (double distance = likely; !mesh.triangles().empty(); distance *= 2.0) {
             const auto look = [&](int other) {
                 const double to_box = mesh.box_of(other).squaredExteriorDistance(p);
                 if (to_box > kRounding * std::max(nearest[0], nearest[1])) return;
@@ -368,7 +367,7 @@ void PatchSource::look_beside(const std::vector<int>& vertices) {
                 if (d < nearest[same] || (d == nearest[same] && other < at[same]))
                     nearest[same] = d, at[same] = other;
             };
-            boxes_->for_each_meeting(Box(p - Vec3::Constant(distance), p + Vec3::Constant(distance)), look);
+            mesh.for_each_near(Box(p - Vec3::Constant(distance), p + Vec3::Constant(distance)), look);
             // What is farther may have been seen, but not all of it.
             const double seen2 = distance * distance;
             const bool same = nearest[1] <= std::max(farthest * farthest, nearest[0]);
@@ -391,7 +390,7 @@ Vec3 area_vector(const Triangle& t, const std::vector<Vec3>& at) {
     return (at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]);
 }
 
-std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleBins& mesh) {
+std::vector<int> triangles_around(const Vec3& place, double reach, const TriangleTree& mesh) {
     const std::vector<Vec3>& points = mesh.points();
     const Vec3 extent = Vec3::Constant(reach);
     std::vector<int> result;
@@ -410,14 +409,14 @@ std::vector<int> triangles_around(const Vec3& place, double reach, const Triangl
     return result;
 }
 
-bool have_same_numbers(const std::vector<int>& some, const TriangleBins& mesh, const std::vector<int>& others,
-                       const TriangleBins& other_mesh) {
+bool have_same_numbers(const std::vector<int>& some, const TriangleTree& mesh, const std::vector<int>& others,
+                       const TriangleTree& other_mesh) {
     const Numbers a = numbers_of(some_of(mesh.triangles(), some)),
                   b = numbers_of(some_of(other_mesh.triangles(), others));
     return a.components == b.components && a.euler == b.euler && a.loops == b.loops;
 }
 
-std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins& mesh, PatchSource& source) {
+std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleTree& mesh, PatchSource& source) {
     assert(source.looks_at(mesh));
     if (gone.empty()) return std::nullopt;
     const std::vector<Vec3>& points = mesh.points();
@@ -428,13 +427,13 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
     Box bounds;
     for (const int t : gone) bounds.extend(mesh.box_of(t));
     const Vec3 margin = Vec3::Constant(kMargin * source.spacing());
-    Part part = part_within(Box(bounds.min() - margin, bounds.max() + margin), source.bins());
+    Part part = part_within(Box(bounds.min() - margin, bounds.max() + margin), source.tree());
     const auto comes = coming_vertices(part, points, gone, border, source);
     // What comes and the border have numbers of their own, the border's behind the others.
     const auto own = part.vertices.size();
     std::vector<Vec3> at, normals;
     for (const int v : part.vertices) {
-        at.push_back(source.bins().points()[v]);
+        at.push_back(source.tree().points()[v]);
         normals.push_back(source.normal(v));
     }
     patch.points = at;
@@ -483,7 +482,7 @@ std::optional<Patch> patch_for(const std::vector<int>& gone, const TriangleBins&
     return patch;
 }
 
-bool stays_manifold(const Patch& patch, const TriangleBins& mesh) {
+bool stays_manifold(const Patch& patch, const TriangleTree& mesh) {
     std::vector<int> corners;
     const auto add_corners = [&](const Triangle& t) { corners.insert(corners.end(), t.begin(), t.end()); };
     for (const Triangle& t : patch.triangles) add_corners(t);

@@ -40,44 +40,44 @@ std::size_t count_within(const Box& box, const std::vector<Vec3>& places) {
 /// Patches of one mesh that have no vertex in common.
 class Batch {
 public:
-    /// `bins`: of the mesh as it is, which `lattice` looks at.
-    Batch(MeshTrials& trials, const TriangleBins& bins, PatchSource& lattice, const Surface& surface)
-        : trials_(trials), bins_(bins), lattice_(lattice), margin_(kMargin * surface.resolution()) {}
+    /// `tree`: of the mesh as it is, which `lattice` looks at.
+    Batch(MeshTrials& trials, const TriangleTree& tree, PatchSource& lattice, const Surface& surface)
+        : trials_(trials), tree_(tree), lattice_(lattice), margin_(kMargin * surface.resolution()) {}
 
     /// Around some of these places.
     void make(const std::vector<Vec3>& places, double reach) {
         std::vector<std::vector<int>> gone(places.size());
         parallel_for_each(places.size(), 1,
-                          [&](std::size_t p) { gone[p] = triangles_around(places[p], reach, bins_); });
+                          [&](std::size_t p) { gone[p] = triangles_around(places[p], reach, tree_); });
         std::vector<char> taken(trials_.mesh().vertices.size(), 0);
         std::vector<std::vector<int>> apart;
         std::vector<Vec3> middles;  // of these
         for (std::size_t p = 0; p < places.size(); ++p) {
             std::vector<int>& some = gone[p];
             const auto is_taken = [&](int t) {
-                const Triangle& corners = bins_.triangles()[t];
+                const Triangle& corners = tree_.triangles()[t];
                 return std::any_of(corners.begin(), corners.end(), [&](int v) { return taken[v] != 0; });
             };
             if (some.empty() || std::any_of(some.begin(), some.end(), is_taken)) continue;
             for (const int t : some)
-                for (const int v : bins_.triangles()[t]) taken[v] = 1;
+                for (const int v : tree_.triangles()[t]) taken[v] = 1;
             apart.push_back(std::move(some));
             middles.push_back(places[p]);
         }
         std::vector<std::optional<Patch>> patches(apart.size());
         parallel_for_each(apart.size(), 1, [&](std::size_t p) {
-            patches[p] = patch_for(apart[p], bins_, lattice_);
+            patches[p] = patch_for(apart[p], tree_, lattice_);
             if (!patches[p]) return;
             const std::vector<Vec3> corners = corners_of(*patches[p], trials_.mesh());
             if (has_flat_triangle(corners) || !trials_.may_have(corners) ||
-                !stays_manifold(*patches[p], bins_))
+                !stays_manifold(*patches[p], tree_))
                 patches[p].reset();
         });
         for (std::size_t p = 0; p < patches.size(); ++p) {
             auto& patch = patches[p];
             if (!patch) continue;
             Box box(middles[p]);
-            for (const int t : patch->gone) box.extend(bins_.box_of(t));
+            for (const int t : patch->gone) box.extend(tree_.box_of(t));
             for (const Vec3& corner : corners_of(*patch, trials_.mesh())) box.extend(corner);
             candidates_.push_back({std::move(*patch), with_margin(box, margin_)});
         }
@@ -134,7 +134,7 @@ private:
         }
     }
     MeshTrials& trials_;
-    const TriangleBins& bins_;
+    const TriangleTree& tree_;
     PatchSource& lattice_;
     const double margin_;
     std::vector<Candidate> candidates_;
@@ -165,20 +165,20 @@ std::size_t mend_in_batches(MeshTrials& trials, const Surface& surface) {
     const auto places_now = [&] { return apart(trials.failing_places(), kApart * resolution); };
     std::vector<Vec3> places = places_now();
     PatchSource lattice(surface.lattice_mesh(places, kLatticeReach * resolution), resolution);
-    std::optional<TriangleBins> bins;  // of the mesh as it is
+    std::optional<TriangleTree> tree;  // of the mesh as it is
     std::size_t count = 0;
     for (const double reach : kReaches) {
         if (places.empty()) break;
-        if (!bins) {
-            bins.emplace(trials.mesh().vertices, trials.mesh().carved.triangles, 0.5 * resolution);
-            lattice.look_at(*bins);
+        if (!tree) {
+            tree.emplace(trials.mesh().vertices, trials.mesh().carved.triangles);
+            lattice.look_at(*tree);
         }
-        Batch batch(trials, *bins, lattice, surface);
+        Batch batch(trials, *tree, lattice, surface);
         batch.make(places, reach * resolution);
         const std::size_t put_in = batch.put_in();
         if (put_in == 0) continue;
         count += put_in;
-        bins.reset();
+        tree.reset();
         places = places_now();
     }
     return count;

@@ -89,7 +89,7 @@ std::vector<Vec3> unmatched_components(const FrameMesh& mesh, const std::vector<
 }
 
 /// Whether a patch crosses the rest of its mesh or itself.
-bool crosses(const Patch& patch, const TriangleBins& mesh) {
+bool crosses(const Patch& patch, const TriangleTree& mesh) {
     std::vector<Vec3> points = mesh.points();
     points.insert(points.end(), patch.points.begin(), patch.points.end());
     Box box;
@@ -166,15 +166,15 @@ public:
 
     /// Whether both mesh and lattice, around a place, face much the same way everywhere, as most do: then
     /// nothing is joined or parted there. It takes half the time of the numbers, or less.
-    bool is_one_sheet(const Vec3& place, const TriangleBins& mesh) const {
+    bool is_one_sheet(const Vec3& place, const TriangleTree& mesh) const {
         constexpr double kSameWay = 0.3;  // cosine
         const Vec3 extent = Vec3::Constant(kSmall * resolution_);
         Vec3 mean = Vec3::Zero();  // of the mesh, which has fewer triangles
-        for (const TriangleBins* bins : {&mesh, &lattice_.bins()}) {
+        for (const TriangleTree* tree : {&mesh, &lattice_.tree()}) {
             std::vector<Vec3> ways;
-            for (const int t : bins->meeting(Box(place - extent, place + extent)))
-                ways.push_back(area_vector(bins->triangles()[t], bins->points()).normalized());
-            if (bins == &mesh) mean = std::accumulate(ways.begin(), ways.end(), mean).normalized();
+            for (const int t : tree->meeting(Box(place - extent, place + extent)))
+                ways.push_back(area_vector(tree->triangles()[t], tree->points()).normalized());
+            if (tree == &mesh) mean = std::accumulate(ways.begin(), ways.end(), mean).normalized();
             if (ways.empty() || std::any_of(ways.begin(), ways.end(),
                                             [&](const Vec3& way) { return !(way.dot(mean) > kSameWay); }))
                 return false;
@@ -185,15 +185,15 @@ public:
     /// Puts those of some places first where mesh and lattice have other numbers around. Returns how many. A
     /// patch seldom changes the numbers at the others, and takes ten times as long to make.
     std::size_t put_differing_first(std::vector<Vec3>& places) {
-        const TriangleBins& bins = bins_of_mesh();
-        const auto around = [&](const Vec3& place, const TriangleBins& mesh) {
+        const TriangleTree& tree = tree_of_mesh();
+        const auto around = [&](const Vec3& place, const TriangleTree& mesh) {
             return triangles_around(place, kSmall * resolution_, mesh);
         };
         std::vector<char> differ(places.size());
         tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
-            differ[p] = !is_one_sheet(places[p], bins) &&
-                        !have_same_numbers(around(places[p], bins), bins, around(places[p], lattice_.bins()),
-                                           lattice_.bins());
+            differ[p] = !is_one_sheet(places[p], tree) &&
+                        !have_same_numbers(around(places[p], tree), tree, around(places[p], lattice_.tree()),
+                                           lattice_.tree());
         });
         std::vector<Vec3> sorted;
         for (const char first : {1, 0})
@@ -205,10 +205,10 @@ public:
 
     /// Those of some places where a patch would change the numbers; where none fits, too, if `or_unfit`.
     std::vector<Vec3> unlike(const std::vector<Vec3>& places, bool or_unfit) {
-        const TriangleBins& bins = bins_of_mesh();
+        const TriangleTree& tree = tree_of_mesh();
         std::vector<std::vector<int>> gone(places.size());
         tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
-            gone[p] = triangles_around(places[p], kSmall * resolution_, bins);
+            gone[p] = triangles_around(places[p], kSmall * resolution_, tree);
         });
         std::vector<std::vector<int>> fresh = gone;  // where triangles are large, many places have the same
         std::sort(fresh.begin(), fresh.end());
@@ -218,7 +218,7 @@ public:
                     fresh.end());
         std::vector<std::optional<MeshNumbers>> change(fresh.size());
         tbb::parallel_for(std::size_t{0}, fresh.size(),
-                          [&](std::size_t n) { change[n] = change_by(patch_for(fresh[n], bins, lattice_)); });
+                          [&](std::size_t n) { change[n] = change_by(patch_for(fresh[n], tree, lattice_)); });
         for (std::size_t n = 0; n < fresh.size(); ++n) change_.emplace(std::move(fresh[n]), change[n]);
         std::vector<char> is_unlike;
         for (const std::vector<int>& some : gone) {
@@ -237,9 +237,8 @@ public:
     }
     /// What is known of the mesh, which is another now.
     void forget() {
-        bins_.reset();
-        change_.clear();
-        try_again();
+        tree_.reset();
+        forget_patches();
     }
     /// Takes the patch within `reach` resolutions of a place if it is wanted by how it changes the numbers,
     /// near enough to the surface, wanted by the numbers of the whole mesh, if it crosses nothing, and if its
@@ -250,7 +249,7 @@ public:
     std::optional<bool> patch_at(const Vec3* place, const Vec3* end, double reach, const IsWanted& is_wanted,
                                  const AreWanted& are_wanted, const TryMesh& try_mesh) {
         const FrameMesh& mesh = trials_.mesh();
-        const TriangleBins& bins = bins_of_mesh();
+        const TriangleTree& tree = tree_of_mesh();
         const auto& [gone, patch] = made_at(place, end, reach, is_wanted);
         if (!tried_.insert(gone).second) return false;
         ++effort_.patches;
@@ -261,20 +260,27 @@ public:
             ++effort_.too_far;
             return false;
         }
-        if (!stays_manifold(*patch, bins)) return false;
+        if (!stays_manifold(*patch, tree)) return false;
         effort_.triangles += mesh.carved.triangles.size();
         FrameMesh other = patched(mesh, {&*patch});
         if (!are_wanted(numbers_of(other))) return false;
-        if (has_flat_triangle(corners) || crosses(*patch, bins)) return std::nullopt;
+        if (has_flat_triangle(corners) || crosses(*patch, tree)) return std::nullopt;
         if (!try_mesh(std::move(other))) {
             ++effort_.refused;
             return std::nullopt;
         }
-        forget();
+        TriangleTree next(mesh.vertices, mesh.carved.triangles, tree, gone);
+        tree_.emplace(std::move(next));
+        lattice_.look_at(*tree_);
+        forget_patches();
         return true;
     }
 
 private:
+    void forget_patches() {
+        change_.clear();
+        try_again();
+    }
     struct Made {
         std::vector<int> gone;
         std::optional<Patch> patch;  // if there is one that was not tried and may be wanted
@@ -288,35 +294,35 @@ private:
         constexpr std::ptrdiff_t kAtOnce = 4;
         for (std::size_t p = 0; made_reach_ == reach && p < made_.size(); ++p)
             if (made_from_ + p == place) return made_[p];
-        const TriangleBins& bins = bins_of_mesh();
+        const TriangleTree& tree = tree_of_mesh();
         made_from_ = place;
         made_reach_ = reach;
         made_.assign(static_cast<std::size_t>(std::min(kAtOnce, end - place)), {});
         tbb::parallel_for(std::size_t{0}, made_.size(), [&](std::size_t p) {
             auto& [gone, patch] = made_[p];
-            gone = triangles_around(place[p], reach * resolution_, bins);
+            gone = triangles_around(place[p], reach * resolution_, tree);
             const auto known = change_.find(gone);
             const bool is_of_use = known == change_.end() || (known->second && is_wanted(*known->second));
-            if (is_of_use && tried_.count(gone) == 0) patch = patch_for(gone, bins, lattice_);
+            if (is_of_use && tried_.count(gone) == 0) patch = patch_for(gone, tree, lattice_);
         });
         for (const auto& [gone, patch] : made_)
             change_.emplace(gone, change_by(patch));  // unless it is known
         return made_.front();
     }
-    const TriangleBins& bins_of_mesh() {
+    const TriangleTree& tree_of_mesh() {
         const FrameMesh& mesh = trials_.mesh();
-        if (!bins_) {
-            bins_.emplace(mesh.vertices, mesh.carved.triangles, 0.5 * resolution_);
-            lattice_.look_at(*bins_);
+        if (!tree_) {
+            tree_.emplace(mesh.vertices, mesh.carved.triangles);
+            lattice_.look_at(*tree_);
         }
-        return *bins_;
+        return *tree_;
     }
 
     MeshTrials& trials_;
     Effort& effort_;
     const double resolution_;
     PatchSource lattice_;
-    std::optional<TriangleBins> bins_;  // of the mesh as it is
+    std::optional<TriangleTree> tree_;  // of the mesh as it is
     std::set<std::vector<int>> tried_;  // triangles of it that went
     // By triangles of it that go, all that were tried among them: how a patch for them changes the numbers,
     // if there is one.

@@ -46,10 +46,10 @@ void expect_sound(const TriangleMesh& mesh, std::size_t components, long euler) 
 
 std::optional<Patch> patch_around(const Vec3& place, double reach, const TriangleMesh& mesh,
                                   const TriangleMesh& fine, double spacing) {
-    const TriangleBins bins(mesh.points, mesh.triangles, spacing);
+    const TriangleTree tree(mesh.points, mesh.triangles);
     PatchSource source(fine, spacing);
-    source.look_at(bins);
-    return patch_for(triangles_around(place, reach, bins), bins, source);
+    source.look_at(tree);
+    return patch_for(triangles_around(place, reach, tree), tree, source);
 }
 
 TEST(PatchSource, LooksBesideForTheNearestThatFacesTheSameWay) {
@@ -61,7 +61,7 @@ TEST(PatchSource, LooksBesideForTheNearestThatFacesTheSameWay) {
     for (const Vec3& p : inner.points) shell.points.push_back(kInner * p);
     for (const auto& [i, j, k] : inner.triangles)
         shell.triangles.push_back({outer_count + i, outer_count + k, outer_count + j});
-    const TriangleBins bins(shell.points, shell.triangles, 0.1);
+    const TriangleTree tree(shell.points, shell.triangles);
     struct Nearest {
         double same = std::numeric_limits<double>::infinity(), other = same;
     };
@@ -78,7 +78,7 @@ TEST(PatchSource, LooksBesideForTheNearestThatFacesTheSameWay) {
         for (Vec3& p : between.points) p *= radius;
         for (const double spacing : {0.1, 0.025, 0.002}) {
             PatchSource source(between, spacing);
-            source.look_at(bins);
+            source.look_at(tree);
             std::vector<int> all(between.points.size());
             std::iota(all.begin(), all.end(), 0);
             source.look_beside(all);
@@ -106,9 +106,9 @@ TEST(PatchSource, LooksBesideForTheNearestThatFacesTheSameWay) {
 TEST(PatchSource, FindsTheSameInAnyOrderAndTheFirstOfEquals) {
     // At a vertex all triangles around are as near.
     const TriangleMesh sphere = support::icosphere(3);
-    const TriangleBins bins(sphere.points, sphere.triangles, 0.1);
+    const TriangleTree tree(sphere.points, sphere.triangles);
     PatchSource at_once(sphere, 0.1), one_by_one(sphere, 0.1);
-    for (PatchSource* source : {&at_once, &one_by_one}) source->look_at(bins);
+    for (PatchSource* source : {&at_once, &one_by_one}) source->look_at(tree);
     std::vector<int> all(sphere.points.size());
     std::iota(all.begin(), all.end(), 0);
     at_once.look_beside(all);
@@ -125,14 +125,14 @@ TEST(PatchSource, FindsTheSameInAnyOrderAndTheFirstOfEquals) {
 
 TEST(PatchSource, LooksAtAnotherMesh) {
     const TriangleMesh none, sphere = support::icosphere(1);
-    const TriangleBins no_bins(none.points, none.triangles, 0.1), bins(sphere.points, sphere.triangles, 0.1);
+    const TriangleTree no_tree(none.points, none.triangles), tree(sphere.points, sphere.triangles);
     PatchSource source(sphere, 0.1);
-    source.look_at(no_bins);
+    source.look_at(no_tree);
     source.look_beside({0});
     EXPECT_EQ(source.beside(0), -1);
-    source.look_at(bins);
-    EXPECT_TRUE(source.looks_at(bins));
-    EXPECT_FALSE(source.looks_at(no_bins));
+    source.look_at(tree);
+    EXPECT_TRUE(source.looks_at(tree));
+    EXPECT_FALSE(source.looks_at(no_tree));
     source.look_beside({0});
     EXPECT_GE(source.beside(0), 0);
 }
@@ -252,9 +252,8 @@ TriangleMesh coarse_cube(const Mat3& turn) {
 
 TEST(Patch, PartsHaveTheSameNumbersWhereTheyAreAlikeButForTheirTriangles) {
     const TriangleMesh sphere = support::icosphere(3), fine = support::icosphere(4);
-    const TriangleBins bins(sphere.points, sphere.triangles, 0.1),
-        bins_of_fine(fine.points, fine.triangles, 0.1);
-    const auto around = [](const std::vector<Vec3>& places, double reach, const TriangleBins& mesh) {
+    const TriangleTree tree(sphere.points, sphere.triangles), tree_of_fine(fine.points, fine.triangles);
+    const auto around = [](const std::vector<Vec3>& places, double reach, const TriangleTree& mesh) {
         std::vector<int> some;
         for (const Vec3& place : places)
             for (const int t : triangles_around(place, reach, mesh)) some.push_back(t);
@@ -272,53 +271,53 @@ TEST(Patch, PartsHaveTheSameNumbersWhereTheyAreAlikeButForTheirTriangles) {
         std::vector<int> coarse, other;  // triangles of either mesh
     };
     const auto part = [&](const std::string& name, const auto& of) {
-        return Part{name, of(bins), of(bins_of_fine)};
+        return Part{name, of(tree), of(tree_of_fine)};
     };
     const std::vector<Part> parts = {
-        part("nothing", [&](const TriangleBins&) { return std::vector<int>(); }),
-        part("a disc", [&](const TriangleBins& m) { return around({up}, 0.7, m); }),
+        part("nothing", [&](const TriangleTree&) { return std::vector<int>(); }),
+        part("a disc", [&](const TriangleTree& m) { return around({up}, 0.7, m); }),
         part("two discs",
-             [&](const TriangleBins& m) {
+             [&](const TriangleTree& m) {
                  return around({up, down}, 0.7, m);
              }),
         part("a ring",
-             [&](const TriangleBins& m) { return without(around({up}, 1.0, m), around({up}, 0.4, m)); }),
+             [&](const TriangleTree& m) { return without(around({up}, 1.0, m), around({up}, 0.4, m)); }),
         part("a ring and a disc",
-             [&](const TriangleBins& m) {
+             [&](const TriangleTree& m) {
                  return without(around({up, down}, 1.0, m), around({up}, 0.4, m));
              }),
-        part("a sphere", [&](const TriangleBins& m) { return around({up}, 3.0, m); })};
+        part("a sphere", [&](const TriangleTree& m) { return around({up}, 3.0, m); })};
     for (const Part& one : parts)
         for (const Part& other : parts)
-            EXPECT_EQ(have_same_numbers(one.coarse, bins, other.other, bins_of_fine), &one == &other)
+            EXPECT_EQ(have_same_numbers(one.coarse, tree, other.other, tree_of_fine), &one == &other)
                 << one.name << ", " << other.name;
     // A torus has as many components and loops as a sphere, components and the Euler number of a ring, and
     // loops and the Euler number of nothing.
     const TriangleMesh torus = support::torus(20, 12), fine_torus = support::torus(40, 24);
-    const TriangleBins bins_of_torus(torus.points, torus.triangles, 0.1),
-        bins_of_fine_torus(fine_torus.points, fine_torus.triangles, 0.1);
-    const auto all = around({up}, 9.0, bins_of_torus);
+    const TriangleTree tree_of_torus(torus.points, torus.triangles),
+        tree_of_fine_torus(fine_torus.points, fine_torus.triangles);
+    const auto all = around({up}, 9.0, tree_of_torus);
     ASSERT_EQ(all.size(), torus.triangles.size());
     EXPECT_TRUE(
-        have_same_numbers(all, bins_of_torus, around({up}, 9.0, bins_of_fine_torus), bins_of_fine_torus));
+        have_same_numbers(all, tree_of_torus, around({up}, 9.0, tree_of_fine_torus), tree_of_fine_torus));
     for (const Part& other : parts)
-        EXPECT_FALSE(have_same_numbers(all, bins_of_torus, other.other, bins_of_fine)) << other.name;
+        EXPECT_FALSE(have_same_numbers(all, tree_of_torus, other.other, tree_of_fine)) << other.name;
 }
 
 TEST(Patch, LeavesAManifoldWhereItsFansClose) {
     const TriangleMesh sphere = support::icosphere(2);
-    const TriangleBins bins(sphere.points, sphere.triangles, 0.1);
+    const TriangleTree tree(sphere.points, sphere.triangles);
     Patch same;
-    same.gone = triangles_around({0, 0, 1}, 0.4, bins);
+    same.gone = triangles_around({0, 0, 1}, 0.4, tree);
     for (const int t : same.gone) same.triangles.push_back(sphere.triangles[t]);
     ASSERT_GT(same.triangles.size(), 4u);
-    EXPECT_TRUE(stays_manifold(same, bins));
+    EXPECT_TRUE(stays_manifold(same, tree));
     const auto is_sound = [&](const Patch& patch) {
         const MeshTopology topology = mesh_topology(patched(sphere, patch));
         return topology.closed() && topology.oriented() && topology.manifold();
     };
     const auto expect_no_manifold = [&](const Patch& patch) {
-        EXPECT_FALSE(stays_manifold(patch, bins));
+        EXPECT_FALSE(stays_manifold(patch, tree));
         EXPECT_FALSE(is_sound(patch));  // by an independent count
     };
     Patch open = same;
@@ -330,7 +329,7 @@ TEST(Patch, LeavesAManifoldWhereItsFansClose) {
     Patch all_goes = nothing;
     all_goes.gone.resize(sphere.triangles.size());
     std::iota(all_goes.gone.begin(), all_goes.gone.end(), 0);
-    EXPECT_TRUE(stays_manifold(all_goes, bins));
+    EXPECT_TRUE(stays_manifold(all_goes, tree));
     Patch turned = same;
     std::swap(turned.triangles[0][1], turned.triangles[0][2]);
     expect_no_manifold(turned);
@@ -353,7 +352,7 @@ TEST(Patch, LeavesAManifoldWhereItsFansClose) {
     apart.points.push_back({0, 0, -3});
     for (std::size_t t = same.triangles.size(); t < apart.triangles.size(); ++t)
         std::replace(apart.triangles[t].begin(), apart.triangles[t].end(), far, first + 3);
-    EXPECT_TRUE(stays_manifold(apart, bins));
+    EXPECT_TRUE(stays_manifold(apart, tree));
     EXPECT_TRUE(is_sound(apart));
 }
 
