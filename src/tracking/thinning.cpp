@@ -8,7 +8,6 @@
 #include <functional>
 #include <limits>
 #include <queue>
-#include <set>
 #include <utility>
 
 #include "find_in_blocks.h"
@@ -143,7 +142,11 @@ private:
     }
     /// A list of them, which may be changed from now on.
     std::vector<int>& fan_of(int i) {
-        if (!changed_[i]) for_each_around(i, [&](int t) { fan_[i].push_back(t); });
+        if (!changed_[i]) {
+            constexpr std::size_t kMostlyEnough = 8;
+            fan_[i].reserve(kMostlyEnough);
+            for_each_around(i, [&](int t) { fan_[i].push_back(t); });
+        }
         changed_[i] = 1;
         return fan_[i];
     }
@@ -235,14 +238,19 @@ private:
                        std::find(corner.begin(), corner.end(), gone) == corner.end();
             });
         };
-        std::set<std::pair<int, int>> edges;
+        std::vector<std::pair<int, int>> edges;
+        edges.reserve(3 * closing.size());
         for (const Triangle& t : closing)
             for (int k = 0; k < 3; ++k) {
                 const int v = t[k], w = t[(k + 1) % 3];
                 int count = 0;
                 for_each_around(v, [&](int) { ++count; });
                 if (count <= 3) return false;
-                if (!edges.insert(std::minmax(v, w)).second && share(v, w)) return false;  // between two
+                const std::pair<int, int> edge = std::minmax(v, w);
+                if (std::find(edges.begin(), edges.end(), edge) == edges.end())
+                    edges.push_back(edge);
+                else if (share(v, w))  // it is between two
+                    return false;
             }
         return true;
     }

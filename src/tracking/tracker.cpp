@@ -1,5 +1,6 @@
 #include "isotrack/tracking/tracker.h"
 
+#include <tbb/parallel_invoke.h>
 #include <tbb/task_group.h>
 
 #include <algorithm>
@@ -326,10 +327,13 @@ void Tracker::Impl::follow(FrameWork& work, const Pace& pace, bool warm) {
         fill_sparse(particles, last_mesh.triangles, last_mesh.ring, surface, next_id, pace.band);
     last_mesh.grow(particles.size(), parents);
     keep.resize(particles.size(), 1);
-    particles.retain(keep);
-    last_mesh.retain(keep);
+    retain(keep);
     const std::vector<char> moving = warm ? restless(l.detail) : std::vector<char>();
     frame.sweeps += relax(particles, last_mesh.ring.squared(moving), surface, pace.sweeps, moving);
+}
+
+void Tracker::Impl::retain(const std::vector<char>& keep) {
+    tbb::parallel_invoke([&] { particles.retain(keep); }, [&] { last_mesh.retain(keep); });
 }
 
 /// Those around triangles that are too sharp, the newborn, and those next to them.
@@ -380,8 +384,7 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
         if (last_mesh.ring.size() == 0) last_mesh.make_ring(particles.size());
         last_mesh.grow(particles.size());  // a frame that failed midway may have left it behind
         const std::vector<char> found = carry(particles, last_mesh.ring, surface, motion);
-        particles.retain(found);
-        last_mesh.retain(found);
+        retain(found);
         frame.lost = static_cast<std::size_t>(std::count(found.begin(), found.end(), 0));
     }
     const bool warm = !particles.empty();  // where all are lost as well, the surface is met anew

@@ -81,6 +81,7 @@ struct Tracker::Impl {
 
     void follow(FrameWork& work, const Pace& pace, bool warm);
     std::vector<char> restless(double detail) const;
+    void retain(const std::vector<char>& keep);  // particles, and what is known of them
     void make_room(const Surface& surface, TrackedFrame& frame);
     void measure(FrameWork& work);
     void seed(FrameWork& work, double apart);
