@@ -11,20 +11,20 @@ namespace isotrack {
 
 /// The bounding boxes of some triangles, in a balanced binary tree over leaves of those that follow each
 /// other. Boxes are in floats from the least corner of all points on, rounded outwards: those less than 2e-7
-/// of the extent of all points apart may be said to meet. Some 32 bytes a box, 36 while it is made.
-/// Read-only, so threads may share it.
+/// of the extent of all points apart may be said to meet. Some 32 bytes a box, 36 while it is made. Points
+/// must be finite. Making it uses TBB inside; it is read-only, so threads may share it.
 class BoxTree {
 public:
-    /// Of those with a flag in `some`, along Hilbert's curve. Points must be finite. Uses TBB inside.
+    /// Of those with a flag in `some`, along Hilbert's curve.
     BoxTree(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
             const std::vector<char>& some);
-    /// In this order, of runs of so many triangles that follow each other: number n begins with triangle n
-    /// times `run_length`, and n is what is said of it.
+    /// In this order, one box for each run of `run_length` triangles that follow each other. Run n begins
+    /// with triangle n times `run_length`; it is visited as triangle n is where each has a box of its own.
     BoxTree(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
             const std::vector<int>& order, int run_length);
 
     std::size_t leaf_count() const { return leaves_.size(); }
-    std::vector<int> order() const;
+    std::vector<int> order() const;  ///< Of all triangles or runs, leaf by leaf.
 
     /// Calls `visit(t, u)` with the pairs of triangles whose boxes meet, once with each: t is in this leaf, u
     /// in it or in one behind it.

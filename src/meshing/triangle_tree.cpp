@@ -16,6 +16,7 @@ std::vector<int> order_after(const BoxTree& before, const std::vector<int>& gone
     for (int& n : number) n = n != 0 ? kept++ : -1;
     for (int& t : order) t = number[t];
     order.erase(std::remove(order.begin(), order.end(), -1), order.end());
+    assert(order.size() <= count);
     order.resize(count);
     std::iota(order.begin() + kept, order.end(), kept);
     return order;
@@ -49,7 +50,7 @@ TriangleTree::TriangleTree(const std::vector<Vec3>& points, const std::vector<Tr
 }
 
 TriangleTree TriangleTree::in_order(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
-    constexpr int kRunLength = 8;
+    constexpr int kRunLength = 8;  // as many as a lattice mesh has of one crossed edge
     return {points, triangles, numbers_below((triangles.size() + kRunLength - 1) / kRunLength), kRunLength};
 }
 

@@ -15,8 +15,9 @@ class TriangleTree {
 public:
     /// Both vectors must outlive it. Uses TBB inside, as the others do.
     TriangleTree(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles);
-    /// In a fraction of the time: of what became of the mesh of another tree. Of its triangles `gone`,
-    /// ascending, are not there any more, the others have kept their order, and behind them is what came.
+    /// In a fraction of the time: of what became of the mesh of another tree, which was not made `in_order`.
+    /// Of its triangles `gone`, ascending, are not there any more, the others have kept their order, and
+    /// behind them is what came. Nothing but the order of `before` is read: its mesh may be this one already.
     TriangleTree(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
                  const TriangleTree& before, const std::vector<int>& gone);
     /// In less time and memory, for triangles of which those that follow each other are near each other.

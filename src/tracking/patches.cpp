@@ -269,8 +269,8 @@ public:
             ++effort_.refused;
             return std::nullopt;
         }
-        TriangleTree next(mesh.vertices, mesh.carved.triangles, tree, gone);
-        tree_.emplace(std::move(next));
+        tree_.emplace(
+            TriangleTree(mesh.vertices, mesh.carved.triangles, tree, gone));  // reads the one before
         lattice_.look_at(*tree_);
         forget_patches();
         return true;

@@ -107,11 +107,14 @@ TEST(PatchSource, FindsTheSameInAnyOrderAndTheFirstOfEquals) {
     // At a vertex all triangles around are as near.
     const TriangleMesh sphere = support::icosphere(3);
     const TriangleTree tree(sphere.points, sphere.triangles);
-    PatchSource at_once(sphere, 0.1), one_by_one(sphere, 0.1);
+    const TriangleTree in_order = TriangleTree::in_order(sphere.points, sphere.triangles);
+    PatchSource at_once(sphere, 0.1), one_by_one(sphere, 0.1), in_other_tree(sphere, 0.1);
     for (PatchSource* source : {&at_once, &one_by_one}) source->look_at(tree);
+    in_other_tree.look_at(in_order);
     std::vector<int> all(sphere.points.size());
     std::iota(all.begin(), all.end(), 0);
     at_once.look_beside(all);
+    in_other_tree.look_beside(all);
     std::reverse(all.begin(), all.end());
     for (const int v : all) one_by_one.look_beside({v});
     for (const int v : all) {
@@ -120,6 +123,7 @@ TEST(PatchSource, FindsTheSameInAnyOrderAndTheFirstOfEquals) {
                          [&](const Triangle& t) { return std::find(t.begin(), t.end(), v) != t.end(); });
         ASSERT_EQ(at_once.beside(v), first - sphere.triangles.begin());
         ASSERT_EQ(one_by_one.beside(v), at_once.beside(v));
+        ASSERT_EQ(in_other_tree.beside(v), at_once.beside(v));
     }
 }
 

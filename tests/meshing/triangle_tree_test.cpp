@@ -2,6 +2,8 @@
 #include "meshing/triangle_tree.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <numeric>
@@ -27,8 +29,9 @@ protected:
         return std::uniform_real_distribution<double>(from, to)(random);
     }
     Vec3 place() { return {uniform(-2, 2), uniform(-2, 2), uniform(-2, 2)}; }
-    void expect_all_found(const TriangleTree& tree) {
-        std::size_t found = 0;
+    /// Returns how many triangles were looked at for each that was found.
+    double expect_all_found(const TriangleTree& tree) {
+        std::size_t found = 0, looked_at = 0;
         for (int round = 0; round < 200; ++round) {
             const Vec3 low = place();
             const Box box(low, low + Vec3(uniform(0, 0.6), uniform(0, 0.6), uniform(0, 0.6)));
@@ -37,11 +40,13 @@ protected:
             found += expected.size();
             std::vector<int> near;
             tree.for_each_near(box, [&](int t) { near.push_back(t); });
+            looked_at += near.size();
             std::sort(near.begin(), near.end());
             EXPECT_EQ(std::adjacent_find(near.begin(), near.end()), near.end());
             EXPECT_TRUE(std::includes(near.begin(), near.end(), expected.begin(), expected.end()));
         }
         EXPECT_GT(found, 100u);
+        return static_cast<double>(looked_at) / static_cast<double>(found);
     }
 
     TriangleMesh mesh;
@@ -49,14 +54,14 @@ protected:
 };
 
 TEST_F(InTriangleTree, ThoseThatMeetABoxAreFound) {
-    expect_all_found(TriangleTree(mesh.points, mesh.triangles));
+    EXPECT_LT(expect_all_found(TriangleTree(mesh.points, mesh.triangles)), 1.01);
 }
 
 TEST_F(InTriangleTree, TheyAreFoundWithoutAnotherOrder) {
-    for (const std::size_t count : {mesh.triangles.size(), std::size_t{1001}, std::size_t{1000}}) {
-        mesh.triangles.erase(mesh.triangles.begin(),
-                             mesh.triangles.end() - static_cast<std::ptrdiff_t>(count));
-        expect_all_found(TriangleTree::in_order(mesh.points, mesh.triangles));
+    const TriangleMesh whole = mesh;
+    for (const std::ptrdiff_t count : {1281, 1001, 1000}) {  // with a last run of one triangle, and of eight
+        mesh.triangles.assign(whole.triangles.end() - count, whole.triangles.end());
+        EXPECT_LT(expect_all_found(TriangleTree::in_order(mesh.points, mesh.triangles)), 20.0);
         std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), random);
         expect_all_found(TriangleTree::in_order(mesh.points, mesh.triangles));
     }
@@ -84,10 +89,27 @@ TEST_F(InTriangleTree, TheyAreFoundAfterSomeWentAndOthersCame) {
             for (int corner = 0; corner < 3; ++corner) mesh.points.push_back(middle + 0.1 * place());
             mesh.triangles.push_back({next, next + 1, next + 2});
         }
-        TriangleTree next(mesh.points, mesh.triangles, *tree, gone);
-        tree.emplace(std::move(next));
-        expect_all_found(*tree);
+        tree.emplace(TriangleTree(mesh.points, mesh.triangles, *tree, gone));
+        EXPECT_LT(expect_all_found(*tree), 1.01);
     }
+    expect_all_found(TriangleTree(mesh.points, mesh.triangles, *tree, {}));
+}
+
+TEST(TriangleTree, FindsTheSameAtAnyNumberOfThreads) {
+    const TriangleMesh mesh = support::icosphere(6);  // of many leaves
+    const Box near(Vec3(-0.3, -0.2, -0.1), Vec3(1.3, 1.4, 1.5));
+    std::vector<std::vector<int>> meeting;
+    for (const std::size_t threads : {1, 4}) {
+        const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+        tbb::task_arena(static_cast<int>(threads)).execute([&] {
+            const TriangleTree tree(mesh.points, mesh.triangles);
+            meeting.push_back(tree.meeting(near));
+            meeting.push_back(TriangleTree(mesh.points, mesh.triangles, tree, {}).meeting(near));
+            meeting.push_back(TriangleTree::in_order(mesh.points, mesh.triangles).meeting(near));
+        });
+    }
+    EXPECT_GT(meeting.front().size(), 10000u);
+    for (const std::vector<int>& found : meeting) EXPECT_EQ(found, support::triangles_meeting(near, mesh));
 }
 
 TEST_F(InTriangleTree, NothingIsFoundWhereAllWent) {
