@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <numeric>
 #include <utility>
 
 #include "delaunay/filters.h"
+#include "numbers_below.h"
 #include "room.h"
 
 namespace isotrack {
@@ -68,8 +68,7 @@ void LivingDelaunay::rebuild() {
         for (const int v : cells.vertices[c])
             if (v >= 0) a_cell_[v] = static_cast<int>(c);
     recent_ = 0;
-    changed_.resize(cells.size());
-    std::iota(changed_.begin(), changed_.end(), 0);
+    changed_ = numbers_below(cells.size());
 }
 
 bool LivingDelaunay::insert(int number, const Vec3& p, int near) {
@@ -139,8 +138,7 @@ bool LivingDelaunay::fill_star(int number) {
     link.erase(std::unique(link.begin(), link.end()), link.end());
     hole_.points.clear();
     for (const int v : link) hole_.points.push_back(dt_.points[v]);
-    std::vector<int> all(link.size());
-    std::iota(all.begin(), all.end(), 0);
+    std::vector<int> all = numbers_below(link.size());
     hole_.build(all);
     const Tetrahedra& filling = hole_.cells();
 

@@ -1,11 +1,11 @@
 #include "isotrack/delaunay/tetrahedralisation.h"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "delaunay/living.h"
 #include "delaunay/update_cost.h"
+#include "numbers_below.h"
 #include "room.h"
 
 namespace isotrack {
@@ -226,8 +226,7 @@ private:
 Tetrahedra tetrahedralise(const std::vector<Vec3>& points) {
     IncrementalDelaunay dt;
     dt.points = points;
-    std::vector<int> all(points.size());
-    std::iota(all.begin(), all.end(), 0);
+    std::vector<int> all = numbers_below(points.size());
     dt.build(all);
     dt.arrange();
     return std::move(dt.slots());

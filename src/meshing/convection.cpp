@@ -4,10 +4,10 @@
 
 #include <cmath>
 #include <cstddef>
-#include <numeric>
 
 #include "delaunay/circumcentre.h"
 #include "isotrack/delaunay/predicates.h"
+#include "numbers_below.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -33,10 +33,8 @@ int flow_exit(const Tetrahedra& cells, const std::vector<Vec3>& points, int cell
 CellLabels guided_convection(const Tetrahedra& cells, const std::vector<Vec3>& points,
                              const std::vector<Vec3>& normals, const Surface& surface,
                              std::optional<double> detail) {
-    std::vector<int> all(cells.size());
-    std::iota(all.begin(), all.end(), 0);
     CellLabels labels;
-    update_labels(labels, all, cells, points, normals, surface, detail);
+    update_labels(labels, numbers_below(cells.size()), cells, points, normals, surface, detail);
     return labels;
 }
 

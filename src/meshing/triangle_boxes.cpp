@@ -6,10 +6,10 @@
 #include <boost/geometry/geometries/point.hpp>
 #include <boost/geometry/index/rtree.hpp>
 #include <iterator>
-#include <numeric>
 #include <utility>
 
 #include "meshing/triangle_box.h"
+#include "numbers_below.h"
 
 namespace isotrack {
 namespace {
@@ -21,12 +21,6 @@ using Tree = boost::geometry::index::rtree<Entry, boost::geometry::index::quadra
 
 TreeBox to_tree(const Box& box) {
     return {{box.min().x(), box.min().y(), box.min().z()}, {box.max().x(), box.max().y(), box.max().z()}};
-}
-
-std::vector<int> numbers_below(std::size_t count) {
-    std::vector<int> result(count);
-    std::iota(result.begin(), result.end(), 0);
-    return result;
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <numeric>
 
+#include "numbers_below.h"
+
 namespace isotrack {
 namespace {
 
@@ -20,12 +22,6 @@ std::vector<int> order_after(const BoxTree& before, const std::vector<int>& gone
     order.resize(count);
     std::iota(order.begin() + kept, order.end(), kept);
     return order;
-}
-
-std::vector<int> numbers_below(std::size_t count) {
-    std::vector<int> result(count);
-    std::iota(result.begin(), result.end(), 0);
-    return result;
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "isotrack/meshing/self_intersections.h"
 #include "meshing/patch.h"
 #include "meshing/small_handles.h"
+#include "numbers_below.h"
 #include "sampling/compact.h"
 #include "tracking/patch_batches.h"
 #include "tracking/patching.h"
@@ -121,9 +122,8 @@ std::vector<Vec3> other_places(const FrameMesh& mesh, const Surface& surface) {
 /// are so large that what goes of the lattice would be, too.
 std::vector<Vec3> places_everywhere(const FrameMesh& mesh, double resolution) {
     std::vector<Vec3> all = apart(mesh.vertices, kCovered * resolution, kMostEverywhere + 1);
-    std::vector<int> triangles(mesh.carved.triangles.size());
-    std::iota(triangles.begin(), triangles.end(), 0);
-    const double area = area_of(triangles, mesh) / (resolution * resolution);
+    const double area =
+        area_of(numbers_below(mesh.carved.triangles.size()), mesh) / (resolution * resolution);
     if (all.size() > kMostEverywhere || area > kMostAreaOfPlace * static_cast<double>(all.size()))
         all.clear();
     return all;

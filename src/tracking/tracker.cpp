@@ -7,7 +7,6 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
-#include <numeric>
 
 #include "delaunay/spatial_order.h"
 #include "delaunay/update_cost.h"
@@ -22,6 +21,7 @@
 #include "isotrack/sampling/relaxation.h"
 #include "isotrack/sampling/sizing.h"
 #include "meshing/sharpness.h"
+#include "numbers_below.h"
 #include "parallel_for_each.h"
 #include "sampling/creases.h"
 #include "surface/float_precision.h"
@@ -101,8 +101,7 @@ std::optional<double> Tracker::Impl::flips_within(const SizingLimits& l) const {
 }
 
 void Tracker::Impl::arrange() {
-    std::vector<int> order(particles.size());
-    std::iota(order.begin(), order.end(), 0);
+    std::vector<int> order = numbers_below(particles.size());
     sort_along_curve(particles.position, order);
     particles.reorder(order);
     last_mesh.grow(particles.size());
@@ -169,10 +168,7 @@ FrameMesh Tracker::Impl::carve_mesh(const Surface& surface, std::map<std::string
     const StageTimer timer(seconds, "convect");
     std::vector<int> changed = dt->take_changed();
     const Tetrahedra& cells = dt->cells();
-    if (labels.empty()) {
-        changed.resize(cells.size());
-        std::iota(changed.begin(), changed.end(), 0);
-    }
+    if (labels.empty()) changed = numbers_below(cells.size());
     if (options.reconstruction == Reconstruction::Pure)
         labels = pure_convection(cells, particles.position);
     else
