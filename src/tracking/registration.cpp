@@ -1,6 +1,5 @@
 #include "tracking/registration.h"
 
-#include <Eigen/SVD>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
@@ -9,6 +8,7 @@
 
 #include "parallel_for_each.h"
 #include "surface/thread_probes.h"
+#include "tracking/pieces.h"
 
 namespace isotrack {
 namespace {
@@ -16,86 +16,15 @@ namespace {
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr std::size_t kPieceSize = 48,
-                      kMostPieces = 160;  // about; more of them where there are more components
-constexpr std::size_t kSamples = 24;      // of a piece, at most
+constexpr std::size_t kSamples = 24;  // of a piece, at most
 constexpr int kMostSteps = 8;
-constexpr double kArrived = 0.01;   // resolutions off the surface, root mean square
-constexpr double kFar = 3.0;        // resolutions off: what sees no surface, or is farther
-constexpr double kBetter = 0.98;    // times that of the step before
-constexpr double kStiffness = 0.2;  // of a pair of pieces, over the weight of the samples of one
-constexpr double kDamping = 1e-4;   // of a piece's motion, likewise
-constexpr double kSpread =
-    1e-6;  // squares, across a piece over along it: less is a line, whose turn is not known
-constexpr double kLeastSlope = 0.3;    // of the gradient: less is the edge of the band, or between two sheets
-constexpr double kLeastWeight = 1e-9;  // of a particle's own piece
-constexpr double kSameWay = 0.5;       // cosine between the turned normal and the surface's
-
-/// Particles next to each other, and how they move together: x -> turn (x - middle) + middle + shift.
-struct Piece {
-    std::vector<int> particles;
-    std::vector<int> beside;  // pieces, ascending
-    Vec3 middle = Vec3::Zero(), shift = Vec3::Zero();
-    Mat3 turn = Mat3::Identity();
-    double size2 = 0.0;  // mean square of how far its particles are from the middle
-
-    Vec3 moved(const Vec3& x) const { return turn * (x - middle) + middle + shift; }
-};
-
-/// The rigid motion nearest to that of its particles [Kabsch 1976].
-void move_as(const std::vector<Vec3>& from, const std::vector<Vec3>& to, Piece& piece) {
-    Vec3 middle = Vec3::Zero();
-    for (const int i : piece.particles) middle += to[i] / static_cast<double>(piece.particles.size());
-    Mat3 spread = Mat3::Zero();
-    for (const int i : piece.particles) spread += (to[i] - middle) * (from[i] - piece.middle).transpose();
-    const Eigen::JacobiSVD<Mat3> svd(spread, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    piece.shift = middle - piece.middle;
-    Mat3 mirror = Mat3::Identity();
-    if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) mirror(2, 2) = -1.0;
-    if (svd.singularValues()[1] > kSpread * svd.singularValues()[0])
-        piece.turn = svd.matrixU() * mirror * svd.matrixV().transpose();
-}
-
-/// Grown from particle to particle, in their order.
-std::vector<Piece> make_pieces(const Adjacency& ring, const std::vector<Vec3>& at) {
-    const std::size_t n = at.size(), size = std::max(kPieceSize, n / kMostPieces);
-    std::vector<int> piece_of(n, -1);
-    std::vector<Piece> pieces;
-    for (std::size_t first = 0; first < n; ++first) {
-        if (piece_of[first] >= 0) continue;
-        const int number = static_cast<int>(pieces.size());
-        std::vector<int> some{static_cast<int>(first)};
-        piece_of[first] = number;
-        int neighbour = -1;
-        for (std::size_t next = 0; next < some.size(); ++next)
-            for (const int j : ring.of(some[next])) {
-                if (piece_of[j] >= 0 && piece_of[j] != number) neighbour = piece_of[j];
-                if (piece_of[j] >= 0 || some.size() >= size) continue;
-                piece_of[j] = number;
-                some.push_back(j);
-            }
-        if (neighbour >= 0 && some.size() < size / 4) {  // what was left between others
-            for (const int i : some) piece_of[i] = neighbour;
-            auto& of_neighbour = pieces[neighbour].particles;
-            of_neighbour.insert(of_neighbour.end(), some.begin(), some.end());
-        } else {
-            pieces.emplace_back().particles = std::move(some);
-        }
-    }
-    for (std::size_t k = 0; k < pieces.size(); ++k) {
-        Piece& piece = pieces[k];
-        for (const int i : piece.particles) {
-            piece.middle += at[i] / static_cast<double>(piece.particles.size());
-            for (const int j : ring.of(i))
-                if (piece_of[j] != static_cast<int>(k)) piece.beside.push_back(piece_of[j]);
-        }
-        for (const int i : piece.particles)
-            piece.size2 += (at[i] - piece.middle).squaredNorm() / static_cast<double>(piece.particles.size());
-        std::sort(piece.beside.begin(), piece.beside.end());
-        piece.beside.erase(std::unique(piece.beside.begin(), piece.beside.end()), piece.beside.end());
-    }
-    return pieces;
-}
+constexpr double kArrived = 0.01;    // resolutions off the surface, root mean square
+constexpr double kFar = 3.0;         // resolutions off: what sees no surface, or is farther
+constexpr double kBetter = 0.98;     // times that of the step before
+constexpr double kStiffness = 0.2;   // of a pair of pieces, over the weight of the samples of one
+constexpr double kDamping = 1e-4;    // of a piece's motion, likewise
+constexpr double kLeastSlope = 0.3;  // of the gradient: less is the edge of the band, or between two sheets
+constexpr double kSameWay = 0.5;     // cosine between the turned normal and the surface's
 
 Mat3 cross_matrix(const Vec3& v) {
     Mat3 m;
@@ -223,34 +152,6 @@ private:
     std::vector<Eigen::Triplet<double>> entries_;
     Eigen::VectorXd right_;
 };
-
-/// Where the pieces take the particles, each by its own and those beside it.
-std::vector<Vec3> blended(const std::vector<Piece>& pieces, const std::vector<Vec3>& from) {
-    std::vector<Vec3> result(from.size());
-    parallel_for_each(pieces.size(), 4, [&](std::size_t k) {
-        const Piece& piece = pieces[k];
-        double width2 = 0.0;
-        for (const int l : piece.beside)
-            width2 +=
-                (pieces[l].middle - piece.middle).squaredNorm() / static_cast<double>(piece.beside.size());
-        for (const int i : piece.particles) {
-            result[i] = piece.moved(from[i]);
-            if (!(width2 > 0.0)) continue;
-            const auto weight_of = [&](const Piece& of) {
-                return std::exp(-2.0 * (from[i] - of.middle).squaredNorm() / width2);
-            };
-            double weights = kLeastWeight + weight_of(piece);
-            Vec3 sum = weights * result[i];
-            for (const int l : piece.beside) {
-                const double w = weight_of(pieces[l]);
-                sum += w * pieces[l].moved(from[i]);
-                weights += w;
-            }
-            result[i] = sum / weights;
-        }
-    });
-    return result;
-}
 
 /// Takes a step; false where there is no answer.
 bool step_on(std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double resolution, Solver& solver) {
