@@ -33,7 +33,8 @@ double median_off(const std::vector<Vec3>& places, const Surface& surface) {
 
 /// Of one particle at least.
 std::vector<Vec3> expected_positions(const Particles& particles, const Adjacency& ring,
-                                     const Surface& surface, const Tracker::Motion& motion) {
+                                     const Surface& surface, const CrossingGrid& crossings,
+                                     const Tracker::Motion& motion) {
     const std::size_t n = particles.size();
     std::vector<Vec3> winner;
     double least = std::numeric_limits<double>::infinity();
@@ -55,7 +56,7 @@ std::vector<Vec3> expected_positions(const Particles& particles, const Adjacency
     std::vector<Vec3> guess(n);
     for (std::size_t i = 0; i < n; ++i) guess[i] = particles.position[i] + particles.velocity[i];
     const bool goes_on = take(std::move(guess), kClearly), stands = take(particles.position, kClearly);
-    const auto registered = register_to(surface, particles, ring, winner);
+    const auto registered = register_to(surface, crossings, particles, ring, winner);
     if (!registered) return winner;
     // A field knows better where it knows anything: it may be given in a band alone. What rests elsewhere
     // than a motion that was found says may only be its rounding.
@@ -78,11 +79,11 @@ std::vector<Vec3> expected_positions(const Particles& particles, const Adjacency
 }  // namespace
 
 std::vector<char> carry(Particles& particles, const Adjacency& ring, const Surface& surface,
-                        const Tracker::Motion& motion) {
+                        const CrossingGrid& crossings, const Tracker::Motion& motion) {
     const std::size_t n = particles.size();
     std::vector<char> keep(n, 0);
     if (n == 0) return keep;
-    const std::vector<Vec3> expected = expected_positions(particles, ring, surface, motion);
+    const std::vector<Vec3> expected = expected_positions(particles, ring, surface, crossings, motion);
     ThreadProbes probes(surface);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 128), [&](const auto& range) {
         Surface::Probe& probe = probes.local();

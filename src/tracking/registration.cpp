@@ -2,12 +2,14 @@
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "parallel_for_each.h"
 #include "surface/thread_probes.h"
+#include "tracking/oriented_places.h"
 #include "tracking/pieces.h"
 
 namespace isotrack {
@@ -16,13 +18,23 @@ namespace {
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr std::size_t kSamples = 24;  // of a piece, at most
+constexpr std::size_t kSamples = 24, kSamplesFromAfar = 12;  // of a piece, at most
 constexpr int kMostSteps = 8;
-constexpr double kArrived = 0.01;    // resolutions off the surface, root mean square
-constexpr double kFar = 3.0;         // resolutions off: what sees no surface, or is farther
-constexpr double kBetter = 0.98;     // times that of the step before
-constexpr double kStiffness = 0.2;   // of a pair of pieces, over the weight of the samples of one
-constexpr double kDamping = 1e-4;    // of a piece's motion, likewise
+constexpr double kArrived = 0.01;  // resolutions off the surface, root mean square
+constexpr double kFar = 3.0;       // resolutions off: what sees no surface, or is farther
+constexpr double kBetter = 0.98;   // times that of the step before
+// Over the weight of the samples of a piece: of a pair of pieces, of the motion of one, of that of one that
+// rests. What comes from afar is stiff at first, so that limbs find those that are most like them, and bends
+// as it likes in the end.
+constexpr double kStiffness = 0.2, kStiffnessAfterwards = 0.002, kDamping = 1e-4, kHold = 0.2;
+constexpr std::array<double, 4> kStiffnessFromAfar = {3.2, 0.8, 0.2, 0.05};  // of each step; the last goes on
+constexpr int kMostStepsFromAfar = 15;
+constexpr double kUnseen = 0.03;  // of the samples: with more of them the pieces come from afar
+constexpr double kCloser = 0.97;  // times what it was a step before, from afar
+// Mean sizes of the pieces: how far a place may be, so that a drop is not taken for any other, and what a
+// right angle counts as.
+constexpr double kReach = 1.5, kTurnLength = 2.0;
+constexpr double kAlong = 0.3;       // of the weight across the surface, from afar
 constexpr double kLeastSlope = 0.3;  // of the gradient: less is the edge of the band, or between two sheets
 constexpr double kSameWay = 0.5;     // cosine between the turned normal and the surface's
 
@@ -37,6 +49,7 @@ struct Pull {
     Mat6 squares = Mat6::Zero();
     Vec6 products = Vec6::Zero();
     double off2 = 0.0, samples = 0.0;  // squared distances off the surface; what sees none is far off
+    double unseen = 0.0;               // samples
 
     /// For a piece that nothing holds.
     Vec6 solve(double size2) const { return damped(size2).ldlt().solve(products); }
@@ -63,7 +76,10 @@ Pull pull_of(const Piece& piece, const Particles& particles, double robust, doub
         const Vec3 n = f.gradient / slope;
         pull.samples += 1.0;
         pull.off2 += far * far;
-        if (!(slope > kLeastSlope && n.dot(piece.turn * particles.normal[i]) > kSameWay)) continue;
+        if (!(slope > kLeastSlope && n.dot(piece.turn * particles.normal[i]) > kSameWay)) {
+            pull.unseen += 1.0;
+            continue;
+        }
         const double off = f.value / slope, relative = off / robust;
         const double w = 1.0 / ((1.0 + relative * relative) * (1.0 + relative * relative));
         Vec6 row;
@@ -73,6 +89,68 @@ Pull pull_of(const Piece& piece, const Particles& particles, double robust, doub
         pull.off2 += std::min(off * off - far * far, 0.0);
     }
     return pull;
+}
+
+/// By the places that are next to its samples, no farther than `reach`, and face as they do.
+Pull pull_from_afar(const Piece& piece, const Particles& particles, double reach,
+                    const OrientedPlaces& places) {
+    Pull pull;
+    const std::size_t step = 1 + (piece.particles.size() - 1) / kSamplesFromAfar;
+    const Vec3 centre = piece.middle + piece.shift;
+    for (std::size_t s = 0; s < piece.particles.size(); s += step) {
+        const int i = piece.particles[s];
+        const Vec3 x = piece.moved(particles.position[i]), n = piece.turn * particles.normal[i];
+        const auto& [point, normal] = places.nearest(x, n);
+        const Vec3 way = x - point;
+        pull.samples += 1.0;
+        pull.off2 += std::min(way.squaredNorm(), reach * reach);
+        if (!(way.norm() < reach && n.dot(normal) > 0.0)) continue;
+        Eigen::Matrix<double, 6, 3> rows;
+        rows << cross_matrix(x - centre), Mat3::Identity();
+        const Mat3 weight = normal * normal.transpose() + kAlong * Mat3::Identity();
+        pull.squares += rows * weight * rows.transpose();
+        pull.products -= rows * weight * way;
+    }
+    return pull;
+}
+
+/// Pieces that are on the surface from the start. What comes from afar beside them would take them along,
+/// where they slide in themselves.
+class Resting {
+public:
+    void take(const std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double resolution) {
+        start_ = pieces;
+        for (const Pull& pull : pulls)
+            rests_.push_back(pull.off2 < kArrived * kArrived * resolution * resolution * pull.samples);
+    }
+    /// Pulls piece k back to where it was, if it is one of them.
+    void hold(std::size_t k, const Piece& piece, Pull& pull) const {
+        if (rests_.empty() || !rests_[k]) return;
+        constexpr double kShiftWeight = kHold * kSamples;
+        const double turn_weight = kShiftWeight * piece.size2;
+        const Eigen::AngleAxisd turned(piece.turn * start_[k].turn.transpose());
+        pull.squares.diagonal().head<3>().array() += turn_weight;
+        pull.squares.diagonal().tail<3>().array() += kShiftWeight;
+        pull.products.head<3>() -= turn_weight * turned.angle() * turned.axis();
+        pull.products.tail<3>() -= kShiftWeight * (piece.shift - start_[k].shift);
+    }
+
+private:
+    std::vector<Piece> start_;
+    std::vector<char> rests_;
+};
+
+/// Those of all pieces, and the sum of what was met.
+template <typename PullOf>
+Pull pull_all(std::vector<Pull>& pulls, const PullOf& pull_of) {
+    parallel_for_each(pulls.size(), 4, [&](std::size_t k) { pulls[k] = pull_of(k); });
+    Pull sum;
+    for (const Pull& pull : pulls) {
+        sum.off2 += pull.off2;
+        sum.samples += pull.samples;
+        sum.unseen += pull.unseen;
+    }
+    return sum;
 }
 
 using SparseMatrix = Eigen::SparseMatrix<double>;
@@ -88,11 +166,12 @@ public:
         right_.setZero(unknowns_);
     }
 
-    void add(const std::vector<Piece>& pieces, std::size_t k, const Pull& pull, double resolution) {
+    void add(const std::vector<Piece>& pieces, std::size_t k, const Pull& pull, double resolution,
+             double stiffness) {
         using Row = Eigen::Matrix<double, 6, 3>;
         const Piece& piece = pieces[k];
         const Eigen::Index first = first_[k];
-        constexpr double kHold = kStiffness * kSamples;
+        const double hold = stiffness * kSamples;
         double size2 = resolution * resolution;
         Mat6 own = Mat6::Zero();
         right_.segment<6>(first) += pull.products;
@@ -104,14 +183,14 @@ public:
             Row here;
             here << cross_matrix(arm), Mat3::Identity();
             const Eigen::Index shift = first_[l] + 3;
-            own += kHold * here * here.transpose();
+            own += hold * here * here.transpose();
             if (l < static_cast<int>(k))
-                add_block(first, shift, -kHold * here);
+                add_block(first, shift, -hold * here);
             else
-                add_block(shift, first, -kHold * here.transpose());
-            for (int axis = 0; axis < 3; ++axis) add_entry(shift + axis, shift + axis, kHold);
-            right_.segment<6>(first) -= kHold * here * apart;
-            right_.segment<3>(shift) += kHold * apart;
+                add_block(shift, first, -hold * here.transpose());
+            for (int axis = 0; axis < 3; ++axis) add_entry(shift + axis, shift + axis, hold);
+            right_.segment<6>(first) -= hold * here * apart;
+            right_.segment<3>(shift) += hold * apart;
             size2 = std::max(size2, arm.squaredNorm());
         }
         own += pull.damped(size2);
@@ -154,10 +233,11 @@ private:
 };
 
 /// Takes a step; false where there is no answer.
-bool step_on(std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double resolution, Solver& solver) {
+bool step_on(std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double resolution, double stiffness,
+             Solver& solver) {
     Equations equations(pieces);
     for (std::size_t k = 0; k < pieces.size(); ++k)
-        if (!pieces[k].beside.empty()) equations.add(pieces, k, pulls[k], resolution);
+        if (!pieces[k].beside.empty()) equations.add(pieces, k, pulls[k], resolution, stiffness);
     const Eigen::VectorXd solution = equations.solve(solver);
     for (std::size_t k = 0; k < pieces.size(); ++k)
         if (!pieces[k].beside.empty() && solution.size() == 0) return false;
@@ -177,10 +257,38 @@ bool step_on(std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double 
     return true;
 }
 
+/// Brings them to what is like them in place and normal: iterative closest points [Besl and McKay 1992], less
+/// stiff with each step [Amberg et al. 2007]. False where there is nothing or no answer.
+bool come_from_afar(std::vector<Piece>& pieces, const Resting& resting, const Surface& surface,
+                    const CrossingGrid& crossings, const Particles& particles, Solver& solver) {
+    double size = 0.0;
+    for (const Piece& piece : pieces) size += std::sqrt(piece.size2) / static_cast<double>(pieces.size());
+    const OrientedPlaces places(surface, crossings, kTurnLength * size);
+    if (places.empty()) return false;
+    std::vector<Pull> pulls(pieces.size());
+    double least = std::numeric_limits<double>::infinity();
+    for (int step = 0; step < kMostStepsFromAfar; ++step) {
+        const Pull sum = pull_all(pulls, [&](std::size_t k) {
+            const double reach = kReach * (pieces[k].beside.empty() ? std::sqrt(pieces[k].size2) : size);
+            Pull pull = pull_from_afar(pieces[k], particles, reach, places);
+            resting.hold(k, pieces[k], pull);
+            return pull;
+        });
+        const double off = std::sqrt(sum.off2 / sum.samples);
+        const bool stiffer = step < static_cast<int>(kStiffnessFromAfar.size());
+        if (!stiffer && !(off < kCloser * least)) break;
+        least = off;
+        const double stiffness = stiffer ? kStiffnessFromAfar[step] : kStiffnessFromAfar.back();
+        if (!step_on(pieces, pulls, surface.resolution(), stiffness, solver)) return false;
+    }
+    return true;
+}
+
 }  // namespace
 
-std::optional<std::vector<Vec3>> register_to(const Surface& surface, const Particles& particles,
-                                             const Adjacency& ring, const std::vector<Vec3>& guess) {
+std::optional<std::vector<Vec3>> register_to(const Surface& surface, const CrossingGrid& crossings,
+                                             const Particles& particles, const Adjacency& ring,
+                                             const std::vector<Vec3>& guess) {
     const double resolution = surface.resolution();
     std::vector<Piece> pieces = make_pieces(ring, particles.position);
     parallel_for_each(pieces.size(), 16,
@@ -188,25 +296,33 @@ std::optional<std::vector<Vec3>> register_to(const Surface& surface, const Parti
     ThreadProbes probes(surface);
     std::vector<Pull> pulls(pieces.size());
     Solver solver;
+    Resting resting;
     std::vector<Piece> best;
-    double robust = 2.0 * resolution, least = std::numeric_limits<double>::infinity();
+    double robust = 2.0 * resolution, stiffness = kStiffness, least = std::numeric_limits<double>::infinity();
     for (int step = 0; step <= kMostSteps; ++step) {
-        parallel_for_each(pieces.size(), 4, [&](std::size_t k) {
-            pulls[k] = pull_of(pieces[k], particles, robust, resolution, probes.local());
+        const Pull sum = pull_all(pulls, [&](std::size_t k) {
+            Pull pull = pull_of(pieces[k], particles, robust, resolution, probes.local());
+            resting.hold(k, pieces[k], pull);
+            return pull;
         });
-        double off2 = 0.0, samples = 0.0;
-        for (const Pull& pull : pulls) {
-            off2 += pull.off2;
-            samples += pull.samples;
-        }
-        const double off = std::sqrt(off2 / samples);
+        const double off = std::sqrt(sum.off2 / sum.samples);
         if (!(off < least)) break;
         const bool is_enough = !(off > kArrived * resolution && off < kBetter * least);
         if (step == 0 && is_enough) break;  // as it is
         least = off;
         if (step > 0) best = pieces;
+        if (is_enough) break;
         robust = std::max(resolution, 2.0 * off);
-        if (is_enough || !step_on(pieces, pulls, resolution, solver)) break;
+        if (step == 0 && sum.unseen > kUnseen * sum.samples) {
+            resting.take(pieces, pulls, resolution);
+            std::vector<Piece> come = pieces;
+            if (come_from_afar(come, resting, surface, crossings, particles, solver)) {
+                pieces = std::move(come);
+                stiffness = kStiffnessAfterwards;
+                continue;
+            }
+        }
+        if (!step_on(pieces, pulls, resolution, stiffness, solver)) break;
     }
     if (best.empty()) return std::nullopt;
     return blended(best, particles.position);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <map>
+#include <string>
 #include <utility>
 
 #include "isotrack/surface/level_set.h"
@@ -71,6 +72,42 @@ TEST(MovingAndResting, LetsOneTurnBesideAnotherThatRests) {
         before = place;
         place = place * Eigen::AngleAxisd(0.05, Vec3(0.2, 0.3, 1.0).normalized());
     }
+}
+
+TEST(MovingAndResting, FollowsALimbThatSwingsFartherThanItIsThick) {
+    // To and fro by some 20 voxels at its tip, which is 8 voxels thick: nothing goes on as it went, and the
+    // band of the grid ends 3 voxels from the surface.
+    const auto body = shapes::ellipsoid({0, 0, 0}, {0.8, 0.6, 0.45}, kVoxel);
+    const auto limb = shapes::ellipsoid({1.4, 0, 0}, {0.9, 0.2, 0.2}, kVoxel);
+    const Vec3 joint(0.7, 0, 0);
+    Tracker tracker(with_tolerance(0.2 * kVoxel));
+    Eigen::Isometry3d before = Eigen::Isometry3d::Identity();
+    std::size_t seen = 0, lost = 0;
+    for (int f = 0; f < 6; ++f) {
+        const Eigen::Isometry3d bend =
+            Eigen::Translation3d(joint) *
+            Eigen::AngleAxisd(f % 2 == 0 ? 0.0 : 0.6, Vec3(0.1, 0.2, 1.0).normalized()) *
+            Eigen::Translation3d(-joint);
+        const LevelSet level_set(rasterise(*shapes::unite({body, shapes::moved(limb, bend)}), kVoxel));
+        const TrackedFrame frame = tracker.advance(level_set);
+        support::expect_sound(frame, 1, 2, "frame " + std::to_string(f));
+        double off = 0.0, moved = 0.0;
+        for (std::size_t v = 0; v < frame.mesh.points.size(); ++v) {
+            const Vec3& p = frame.mesh.points[v];
+            const Vec3 at_rest = bend.inverse() * p;
+            if (at_rest.x() < 1.0) continue;
+            const Vec3 truth = p - before * at_rest;
+            off += (frame.mesh.velocities[v] - truth).norm();
+            moved += truth.norm();
+        }
+        if (f > 0) {
+            EXPECT_LT(off, 0.15 * moved) << f;
+            seen += frame.particles;
+            lost += frame.lost;
+        }
+        before = bend;
+    }
+    EXPECT_LT(static_cast<double>(lost), 0.02 * static_cast<double>(seen));
 }
 
 TEST(MovingAndResting, RestsWhereTheSurfaceRests) {

@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "isotrack/meshing/convection.h"
+#include "isotrack/surface/level_set.h"
+#include "isotrack/surface/rasterise.h"
 #include "isotrack/surface/shapes.h"
 #include "support/samples.h"
 #include "tracking/last_mesh.h"
@@ -26,11 +29,16 @@ Eigen::Isometry3d motion_by(double degrees, const Vec3& axis, const Vec3& shift)
 struct Sampled : support::Samples {
     Adjacency ring;
 
-    explicit Sampled(const SurfacePtr& surface) : Samples(*surface, 0.12) {
+    explicit Sampled(const SurfacePtr& surface, double edge = 0.12) : Samples(*surface, edge) {
         const CellLabels labels = guided_convection(cells, particles.position, particles.normal, *surface);
         ring = ring_of(particle_triangles(carve(cells, labels, particles.position)), particles.size());
     }
 };
+
+std::optional<std::vector<Vec3>> register_on(const Surface& surface, const Sampled& sampled,
+                                             const std::vector<Vec3>& guess) {
+    return register_to(surface, CrossingGrid(surface), sampled.particles, sampled.ring, guess);
+}
 
 /// The largest distance from where `truth` takes the particles, over the largest displacement.
 double error_of(const std::vector<Vec3>& found, const Particles& particles,
@@ -55,8 +63,8 @@ TEST(Registration, FollowsWhatTurnsAlongItsSurface) {
     for (int k = 0; k < 3; ++k) {
         const Sampled sampled(solids[k]);
         const Eigen::Isometry3d motion = motion_by(4.0, axes[k], {0.02, 0.01, -0.015});
-        const auto found = register_to(*shapes::moved(solids[k], motion), sampled.particles, sampled.ring,
-                                       sampled.particles.position);
+        const auto found =
+            register_on(*shapes::moved(solids[k], motion), sampled, sampled.particles.position);
         ASSERT_TRUE(found) << k;
         EXPECT_LT(error_of(*found, sampled.particles, {motion}), 0.1) << k;
     }
@@ -69,7 +77,7 @@ TEST(Registration, GoesOnFromAGuess) {
                             expected = motion_by(57.0, {1, 1, 1}, {0.97, 0.01, 0});
     std::vector<Vec3> guess;
     for (const Vec3& p : sampled.particles.position) guess.push_back(expected * p);
-    const auto found = register_to(*shapes::moved(solid, motion), sampled.particles, sampled.ring, guess);
+    const auto found = register_on(*shapes::moved(solid, motion), sampled, guess);
     ASSERT_TRUE(found);
     EXPECT_LT(error_of(*found, sampled.particles, {motion}), 0.005);
 }
@@ -79,8 +87,8 @@ TEST(Registration, LetsBodiesMoveEachInItsOwnWay) {
                other = shapes::ellipsoid({1.5, 0, 0}, {0.5, 0.7, 1.0}, kResolution);
     const Sampled sampled(shapes::unite({one, other}));
     const Eigen::Isometry3d up = motion_by(0.0, {0, 0, 1}, {0, 0, 0.06}), down = up.inverse();
-    const auto found = register_to(*shapes::unite({shapes::moved(one, up), shapes::moved(other, down)}),
-                                   sampled.particles, sampled.ring, sampled.particles.position);
+    const auto found = register_on(*shapes::unite({shapes::moved(one, up), shapes::moved(other, down)}),
+                                   sampled, sampled.particles.position);
     ASSERT_TRUE(found);
     for (std::size_t i = 0; i < found->size(); ++i) {
         const Vec3& p = sampled.particles.position[i];
@@ -88,20 +96,60 @@ TEST(Registration, LetsBodiesMoveEachInItsOwnWay) {
     }
 }
 
+/// A body with a limb that is bent about a joint on its surface.
+SurfacePtr with_limb(const Eigen::Isometry3d& bend) {
+    return shapes::unite({shapes::ellipsoid({0, 0, 0}, {0.8, 0.6, 0.45}, kResolution),
+                          shapes::moved(shapes::ellipsoid({1.4, 0, 0}, {0.9, 0.2, 0.2}, kResolution), bend)});
+}
+
+TEST(Registration, FindsALimbThatSwungBeyondTheBand) {
+    // The tip goes 19 voxels, and is 8 thick; a band of 3 voxels is all that the grid knows.
+    const Vec3 joint(0.7, 0, 0);
+    const Eigen::Isometry3d bend =
+        Eigen::Translation3d(joint) * motion_by(35.0, {0, 0, 1}, {0, 0, 0}) * Eigen::Translation3d(-joint);
+    const Sampled sampled(with_limb(Eigen::Isometry3d::Identity()), 0.06);
+    const LevelSet bent(rasterise(*with_limb(bend), kResolution));
+    const auto& at = sampled.particles.position;
+    const auto found = register_on(bent, sampled, at);
+    ASSERT_TRUE(found);
+    std::size_t on_limb = 0, followed = 0;
+    for (std::size_t i = 0; i < at.size(); ++i) {
+        if (at[i].x() < 0.3) {
+            EXPECT_LT(((*found)[i] - at[i]).norm(), kResolution) << "on the body, which rests";
+        } else if (at[i].x() > 1.2) {
+            ++on_limb;
+            followed += ((*found)[i] - bend * at[i]).norm() < 2.0 * kResolution;
+        }
+    }
+    EXPECT_GT(on_limb, 50u);
+    EXPECT_GT(static_cast<double>(followed), 0.9 * static_cast<double>(on_limb));
+}
+
+TEST(Registration, DoesNotTakeADropForOneThatIsFarFromIt) {
+    const auto body = shapes::box({0, 0, 0}, {0.8, 0.6, 0.5}, kResolution);
+    const auto drop_at = [](double x) { return shapes::sphere({x, 0, 0}, 0.2, kResolution); };
+    const Sampled sampled(shapes::unite({body, drop_at(1.5)}));
+    const LevelSet next(rasterise(*shapes::unite({body, drop_at(2.7)}), kResolution));
+    const auto found = register_on(next, sampled, sampled.particles.position);
+    if (!found) return;
+    for (std::size_t i = 0; i < found->size(); ++i)
+        EXPECT_LT(((*found)[i] - sampled.particles.position[i]).norm(), 2.0 * kResolution);
+}
+
 TEST(Registration, SaysThatNothingMoved) {
     const auto solid = shapes::ellipsoid({0, 0, 0}, {1.0, 0.7, 0.45}, kResolution);
     const Sampled sampled(solid);
-    EXPECT_FALSE(register_to(*solid, sampled.particles, sampled.ring, sampled.particles.position));
+    EXPECT_FALSE(register_on(*solid, sampled, sampled.particles.position));
 }
 
 TEST(Registration, HasNoAnswerWithoutASurfaceNear) {
     const auto solid = shapes::sphere({0, 0, 0}, 1.0, kResolution);
     const Sampled sampled(solid);
     // Everything faces the other way: nothing of it is that surface.
-    Particles turned = sampled.particles;
-    for (Vec3& n : turned.normal) n = -n;
+    Sampled turned = sampled;
+    for (Vec3& n : turned.particles.normal) n = -n;
     EXPECT_FALSE(
-        register_to(*shapes::sphere({0.05, 0, 0}, 1.0, kResolution), turned, sampled.ring, turned.position));
+        register_on(*shapes::sphere({0.05, 0, 0}, 1.0, kResolution), turned, turned.particles.position));
 }
 
 }  // namespace
