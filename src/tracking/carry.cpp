@@ -33,7 +33,7 @@ double median_off(const std::vector<Vec3>& places, const Surface& surface) {
 
 /// Of one particle at least.
 std::vector<Vec3> expected_positions(const Particles& particles, const Adjacency& ring,
-                                     const Surface& surface, const CrossingGrid& crossings,
+                                     const Surface& surface, const Crossings& crossings,
                                      const Tracker::Motion& motion) {
     const std::size_t n = particles.size();
     std::vector<Vec3> winner;
@@ -79,7 +79,7 @@ std::vector<Vec3> expected_positions(const Particles& particles, const Adjacency
 }  // namespace
 
 std::vector<char> carry(Particles& particles, const Adjacency& ring, const Surface& surface,
-                        const CrossingGrid& crossings, const Tracker::Motion& motion) {
+                        const Crossings& crossings, const Tracker::Motion& motion) {
     const std::size_t n = particles.size();
     std::vector<char> keep(n, 0);
     if (n == 0) return keep;

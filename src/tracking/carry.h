@@ -5,14 +5,15 @@
 
 #include "isotrack/sampling/adjacency.h"
 #include "isotrack/sampling/particles.h"
-#include "isotrack/surface/crossing_grid.h"
 #include "isotrack/surface/surface.h"
 #include "isotrack/tracking/tracker.h"
+#include "tracking/registration.h"
 
 namespace isotrack {
 
-/// Brings the particles to the new surface, whose crossings are given, and sets their velocities. Returns a
-/// flag per particle: 0 for one that finds no way there or would change sides, and stays where it was.
+/// Brings the particles to the new surface, whose crossings may be asked for, and sets their velocities.
+/// Returns a flag per particle: 0 for one that finds no way there or would change sides, and stays where it
+/// was.
 ///
 /// A velocity field may be in a unit nobody knows and a motion may have turned round, so three guesses of
 /// where the particles go compete: `motion` if there is one, the last displacement, standing still. The one
@@ -21,6 +22,6 @@ namespace isotrack {
 /// as it can, see `register_to`; when `motion` has won, where that misses the surface. What is on the surface
 /// and would hardly move stays.
 std::vector<char> carry(Particles& particles, const Adjacency& ring, const Surface& surface,
-                        const CrossingGrid& crossings, const Tracker::Motion& motion);
+                        const Crossings& crossings, const Tracker::Motion& motion);
 
 }  // namespace isotrack

@@ -5,6 +5,7 @@
 #include <CGAL/Orthogonal_k_neighbor_search.h>
 #include <CGAL/Search_traits.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -14,7 +15,7 @@
 namespace isotrack {
 namespace {
 
-constexpr std::size_t kMost = 3000;  // places
+constexpr std::size_t kMost = 4000;  // places
 
 struct Key {
     std::array<double, 6> at;
@@ -28,8 +29,9 @@ struct Coordinates {
 using Traits = CGAL::Search_traits<double, Key, const double*, Coordinates, CGAL::Dimension_tag<6>>;
 using Search = CGAL::Orthogonal_k_neighbor_search<Traits>;
 
-Key key_of(const Vec3& point, const Vec3& turned, int place) {
-    return {{point.x(), point.y(), point.z(), turned.x(), turned.y(), turned.z()}, place};
+Key key_of(const Vec3& point, const Vec3& scaled_normal, int place) {
+    return {{point.x(), point.y(), point.z(), scaled_normal.x(), scaled_normal.y(), scaled_normal.z()},
+            place};
 }
 
 }  // namespace
@@ -39,25 +41,33 @@ struct OrientedPlaces::Tree {
 };
 
 OrientedPlaces::OrientedPlaces(const Surface& surface, const CrossingGrid& crossings, double turn_length)
-    : turned_(turn_length / std::sqrt(2.0)), tree_(std::make_unique<Tree>()) {
-    const std::size_t step = 1 + crossings.size() / kMost;
-    places_.resize((crossings.size() + step - 1) / step);
+    : places_(std::min(crossings.size(), kMost)),
+      normal_scale_(turn_length / std::sqrt(2.0)),
+      tree_(std::make_unique<Tree>()) {
     ThreadProbes probes(surface);
     parallel_for_each(places_.size(), 256, [&](std::size_t i) {
-        const Vec3 p = crossings[i * step].point;
+        const Vec3 p = crossings[i * crossings.size() / places_.size()].point;
         places_[i] = {p, probes.local().normal(p)};
     });
     for (std::size_t i = 0; i < places_.size(); ++i)
-        if (!places_[i].normal.isZero(0.0))
-            tree_->of_keys.insert(key_of(places_[i].point, turned_ * places_[i].normal, static_cast<int>(i)));
-    if (tree_->of_keys.size() == 0) places_.clear();
-    tree_->of_keys.build();
+        if (places_[i].normal.squaredNorm() > 0.0)
+            tree_->of_keys.insert(
+                key_of(places_[i].point, normal_scale_ * places_[i].normal, static_cast<int>(i)));
+    if (!empty()) tree_->of_keys.build();  // now, not by the thread that asks first
 }
 
 OrientedPlaces::~OrientedPlaces() = default;
 
+bool OrientedPlaces::empty() const {
+    return size() == 0;
+}
+
+std::size_t OrientedPlaces::size() const {
+    return tree_->of_keys.size();
+}
+
 const OrientedPlaces::Place& OrientedPlaces::nearest(const Vec3& point, const Vec3& normal) const {
-    Search search(tree_->of_keys, key_of(point, turned_ * normal, 0), 1);
+    Search search(tree_->of_keys, key_of(point, normal_scale_ * normal, 0), 1);
     return places_[search.begin()->first.place];
 }
 

@@ -10,7 +10,9 @@
 
 namespace isotrack {
 
-/// Some of a surface's crossings with the normals there. Read-only, so threads may share it.
+/// Some of a surface's crossings, spread over all of them, 4000 at most, with the normals there; those
+/// without a normal are left out. Made with TBB. Read-only, so threads may share it; the same at any thread
+/// count.
 class OrientedPlaces {
 public:
     struct Place {
@@ -21,14 +23,16 @@ public:
     OrientedPlaces(const Surface& surface, const CrossingGrid& crossings, double turn_length);
     ~OrientedPlaces();
 
-    bool empty() const { return places_.empty(); }
-    /// The one next to a place and a normal.
+    bool empty() const;
+    std::size_t size() const;
+    /// The one with the least |p - point|^2 + turn_length^2 (1 - cos), the cosine that of the angle between
+    /// the normals. Not to be asked when there are none.
     const Place& nearest(const Vec3& point, const Vec3& normal) const;
 
 private:
     struct Tree;
     std::vector<Place> places_;
-    double turned_;
+    double normal_scale_;
     std::unique_ptr<Tree> tree_;
 };
 

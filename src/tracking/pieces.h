@@ -20,13 +20,15 @@ struct Piece {
 };
 
 /// Of about 50 particles each that are next to each other along `ring`, larger ones where there would be more
-/// than 160; of what hangs together none is smaller than a quarter of that unless it is all. At rest.
+/// than 160; of what hangs together none is smaller than a quarter of that unless it is all. Each particle is
+/// in one. They have not moved.
 std::vector<Piece> make_pieces(const Adjacency& ring, const std::vector<Vec3>& at);
 
-/// The rigid motion that takes its particles nearest to where they come to [Kabsch 1976].
+/// Gives it the rigid motion that takes its particles nearest to where they come to [Kabsch 1976]; the turn
+/// of a point or a line, which nobody knows, stays as it was.
 void move_as(const std::vector<Vec3>& from, const std::vector<Vec3>& to, Piece& piece);
 
-/// Where the pieces take the particles, each by its own and those beside it.
+/// Where the pieces take the particles, each by its own and those beside it. Uses TBB inside.
 std::vector<Vec3> blended(const std::vector<Piece>& pieces, const std::vector<Vec3>& from);
 
 }  // namespace isotrack

@@ -23,17 +23,17 @@ constexpr int kMostSteps = 8;
 constexpr double kArrived = 0.01;  // resolutions off the surface, root mean square
 constexpr double kFar = 3.0;       // resolutions off: what sees no surface, or is farther
 constexpr double kBetter = 0.98;   // times that of the step before
-// Over the weight of the samples of a piece: of a pair of pieces, of the motion of one, of that of one that
-// rests. What comes from afar is stiff at first, so that limbs find those that are most like them, and bends
-// as it likes in the end.
+// Over kSamples, the weight of a piece: of a pair of pieces, of the motion of one, of that of one that rests.
+// What comes from afar is stiff at first, so that limbs find those that are most like them, and bends as it
+// likes in the end.
 constexpr double kStiffness = 0.2, kStiffnessAfterwards = 0.002, kDamping = 1e-4, kHold = 0.2;
 constexpr std::array<double, 4> kStiffnessFromAfar = {3.2, 0.8, 0.2, 0.05};  // of each step; the last goes on
 constexpr int kMostStepsFromAfar = 15;
-constexpr double kUnseen = 0.03;  // of the samples: with more of them the pieces come from afar
+constexpr double kUnseen = 0.03;  // of the samples of a body: with more of them it comes from afar
 constexpr double kCloser = 0.97;  // times what it was a step before, from afar
-// Mean sizes of the pieces: how far a place may be, so that a drop is not taken for any other, and what a
-// right angle counts as.
-constexpr double kReach = 1.5, kTurnLength = 2.0;
+// Mean sizes of the pieces (its own, of one that nothing is beside): how far a place may be, so that a drop
+// is not taken for any other. Mean sizes: what a right angle counts as.
+constexpr double kReach = 1.35, kTurnLength = 2.0;
 constexpr double kAlong = 0.3;       // of the weight across the surface, from afar
 constexpr double kLeastSlope = 0.3;  // of the gradient: less is the edge of the band, or between two sheets
 constexpr double kSameWay = 0.5;     // cosine between the turned normal and the surface's
@@ -44,12 +44,33 @@ Mat3 cross_matrix(const Vec3& v) {
     return m;
 }
 
+using Lever = Eigen::Matrix<double, 6, 3>;
+/// How far a turn and a shift take what is at the end of an arm, transposed.
+Lever lever(const Vec3& arm) {
+    Lever result;
+    result << cross_matrix(arm), Mat3::Identity();
+    return result;
+}
+
+/// What samples see of the surface.
+struct Sight {
+    double off2 = 0.0, samples = 0.0;  // squared distances off the surface; what sees none is far off
+    double unseen = 0.0;               // samples
+
+    void add(const Sight& other) {
+        off2 += other.off2;
+        samples += other.samples;
+        unseen += other.unseen;
+    }
+    double off() const { return std::sqrt(off2 / samples); }
+    bool has_arrived(double resolution) const { return !(off() > kArrived * resolution); }
+};
+
 /// The normal equations of a piece's own samples, for a turn and a shift of where it is.
 struct Pull {
     Mat6 squares = Mat6::Zero();
     Vec6 products = Vec6::Zero();
-    double off2 = 0.0, samples = 0.0;  // squared distances off the surface; what sees none is far off
-    double unseen = 0.0;               // samples
+    Sight sight;
 
     /// For a piece that nothing holds.
     Vec6 solve(double size2) const { return damped(size2).ldlt().solve(products); }
@@ -62,23 +83,31 @@ struct Pull {
     }
 };
 
-Pull pull_of(const Piece& piece, const Particles& particles, double robust, double resolution,
-             Surface::Probe& probe) {
-    Pull pull;
-    const double far = kFar * resolution;
-    const std::size_t step = 1 + (piece.particles.size() - 1) / kSamples;
-    const Vec3 centre = piece.middle + piece.shift;
+/// Calls `visit(x, n)` with some of its particles, where they are and face as it is now.
+template <typename Visit>
+void for_each_sample(const Piece& piece, std::size_t most, const Particles& particles, const Visit& visit) {
+    const std::size_t step = 1 + (piece.particles.size() - 1) / most;
     for (std::size_t s = 0; s < piece.particles.size(); s += step) {
         const int i = piece.particles[s];
-        const Vec3 x = piece.moved(particles.position[i]);
+        visit(piece.moved(particles.position[i]), piece.turn * particles.normal[i]);
+    }
+}
+
+/// By the surface's values.
+Pull pull_in_sight(const Piece& piece, const Particles& particles, double robust, double resolution,
+                   Surface::Probe& probe) {
+    Pull pull;
+    const double far = kFar * resolution;
+    const Vec3 centre = piece.middle + piece.shift;
+    for_each_sample(piece, kSamples, particles, [&](const Vec3& x, const Vec3& normal) {
         const Surface::Sample f = probe.sample(x);
         const double slope = f.gradient.norm();
         const Vec3 n = f.gradient / slope;
-        pull.samples += 1.0;
-        pull.off2 += far * far;
-        if (!(slope > kLeastSlope && n.dot(piece.turn * particles.normal[i]) > kSameWay)) {
-            pull.unseen += 1.0;
-            continue;
+        pull.sight.samples += 1.0;
+        pull.sight.off2 += far * far;
+        if (!(slope > kLeastSlope && n.dot(normal) > kSameWay)) {
+            pull.sight.unseen += 1.0;
+            return;
         }
         const double off = f.value / slope, relative = off / robust;
         const double w = 1.0 / ((1.0 + relative * relative) * (1.0 + relative * relative));
@@ -86,8 +115,8 @@ Pull pull_of(const Piece& piece, const Particles& particles, double robust, doub
         row << (x - centre).cross(n), n;
         pull.squares += w * row * row.transpose();
         pull.products -= w * off * row;
-        pull.off2 += std::min(off * off - far * far, 0.0);
-    }
+        pull.sight.off2 += std::min(off * off - far * far, 0.0);
+    });
     return pull;
 }
 
@@ -95,63 +124,77 @@ Pull pull_of(const Piece& piece, const Particles& particles, double robust, doub
 Pull pull_from_afar(const Piece& piece, const Particles& particles, double reach,
                     const OrientedPlaces& places) {
     Pull pull;
-    const std::size_t step = 1 + (piece.particles.size() - 1) / kSamplesFromAfar;
     const Vec3 centre = piece.middle + piece.shift;
-    for (std::size_t s = 0; s < piece.particles.size(); s += step) {
-        const int i = piece.particles[s];
-        const Vec3 x = piece.moved(particles.position[i]), n = piece.turn * particles.normal[i];
+    for_each_sample(piece, kSamplesFromAfar, particles, [&](const Vec3& x, const Vec3& n) {
         const auto& [point, normal] = places.nearest(x, n);
         const Vec3 way = x - point;
-        pull.samples += 1.0;
-        pull.off2 += std::min(way.squaredNorm(), reach * reach);
-        if (!(way.norm() < reach && n.dot(normal) > 0.0)) continue;
-        Eigen::Matrix<double, 6, 3> rows;
-        rows << cross_matrix(x - centre), Mat3::Identity();
+        pull.sight.samples += 1.0;
+        if (!(way.squaredNorm() < reach * reach && n.dot(normal) > 0.0)) {
+            pull.sight.off2 += reach * reach;
+            return;
+        }
+        pull.sight.off2 += way.squaredNorm();
+        const Lever rows = lever(x - centre);
         const Mat3 weight = normal * normal.transpose() + kAlong * Mat3::Identity();
         pull.squares += rows * weight * rows.transpose();
         pull.products -= rows * weight * way;
-    }
+    });
     return pull;
 }
 
-/// Pieces that are on the surface from the start. What comes from afar beside them would take them along,
-/// where they slide in themselves.
+/// Those of all pieces; returns what they see together.
+template <typename PullOf>
+Sight pull_all(std::vector<Pull>& pulls, const PullOf& of_piece) {
+    parallel_for_each(pulls.size(), 4, [&](std::size_t k) { pulls[k] = of_piece(k); });
+    Sight sum;
+    for (const Pull& pull : pulls) sum.add(pull.sight);
+    return sum;
+}
+
+/// Which pieces are of a body that is not in sight, but for a few of its samples.
+std::vector<char> out_of_sight(const std::vector<Piece>& pieces, const std::vector<Pull>& pulls) {
+    std::vector<char> result(pieces.size(), 0), met(pieces.size(), 0);
+    for (std::size_t first = 0; first < pieces.size(); ++first) {
+        if (std::exchange(met[first], 1)) continue;
+        std::vector<int> body{static_cast<int>(first)};
+        Sight sight;
+        for (std::size_t next = 0; next < body.size(); ++next) {
+            sight.add(pulls[body[next]].sight);
+            for (const int l : pieces[body[next]].beside)
+                if (!std::exchange(met[l], 1)) body.push_back(l);
+        }
+        if (sight.unseen > kUnseen * sight.samples)
+            for (const int k : body) result[k] = 1;
+    }
+    return result;
+}
+
+/// Those of some pieces that are on the surface from the start. What comes from afar beside them would take
+/// them along, where they slide in themselves.
 class Resting {
 public:
-    void take(const std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double resolution) {
-        start_ = pieces;
-        for (const Pull& pull : pulls)
-            rests_.push_back(pull.off2 < kArrived * kArrived * resolution * resolution * pull.samples);
+    Resting() = default;
+    Resting(const std::vector<Piece>& pieces, const std::vector<char>& some, const std::vector<Pull>& pulls,
+            double resolution)
+        : start_(pieces), rests_(some) {
+        for (std::size_t k = 0; k < pieces.size(); ++k)
+            rests_[k] = some[k] && pulls[k].sight.has_arrived(resolution);
     }
-    /// Pulls piece k back to where it was, if it is one of them.
+    bool rests(std::size_t k) const { return !rests_.empty() && rests_[k]; }
+    /// Pulls piece k, which rests, back to where it was.
     void hold(std::size_t k, const Piece& piece, Pull& pull) const {
-        if (rests_.empty() || !rests_[k]) return;
-        constexpr double kShiftWeight = kHold * kSamples;
-        const double turn_weight = kShiftWeight * piece.size2;
+        const double shift_weight = kHold * kSamples, turn_weight = shift_weight * piece.size2;
         const Eigen::AngleAxisd turned(piece.turn * start_[k].turn.transpose());
         pull.squares.diagonal().head<3>().array() += turn_weight;
-        pull.squares.diagonal().tail<3>().array() += kShiftWeight;
+        pull.squares.diagonal().tail<3>().array() += shift_weight;
         pull.products.head<3>() -= turn_weight * turned.angle() * turned.axis();
-        pull.products.tail<3>() -= kShiftWeight * (piece.shift - start_[k].shift);
+        pull.products.tail<3>() -= shift_weight * (piece.shift - start_[k].shift);
     }
 
 private:
     std::vector<Piece> start_;
     std::vector<char> rests_;
 };
-
-/// Those of all pieces, and the sum of what was met.
-template <typename PullOf>
-Pull pull_all(std::vector<Pull>& pulls, const PullOf& pull_of) {
-    parallel_for_each(pulls.size(), 4, [&](std::size_t k) { pulls[k] = pull_of(k); });
-    Pull sum;
-    for (const Pull& pull : pulls) {
-        sum.off2 += pull.off2;
-        sum.samples += pull.samples;
-        sum.unseen += pull.unseen;
-    }
-    return sum;
-}
 
 using SparseMatrix = Eigen::SparseMatrix<double>;
 using Solver = Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower>;
@@ -168,7 +211,6 @@ public:
 
     void add(const std::vector<Piece>& pieces, std::size_t k, const Pull& pull, double resolution,
              double stiffness) {
-        using Row = Eigen::Matrix<double, 6, 3>;
         const Piece& piece = pieces[k];
         const Eigen::Index first = first_[k];
         const double hold = stiffness * kSamples;
@@ -180,8 +222,7 @@ public:
             const Piece& other = pieces[l];
             const Vec3 arm = piece.turn * (other.middle - piece.middle),
                        apart = piece.moved(other.middle) - (other.middle + other.shift);
-            Row here;
-            here << cross_matrix(arm), Mat3::Identity();
+            const Lever here = lever(arm);
             const Eigen::Index shift = first_[l] + 3;
             own += hold * here * here.transpose();
             if (l < static_cast<int>(k))
@@ -233,11 +274,11 @@ private:
 };
 
 /// Takes a step; false where there is no answer.
-bool step_on(std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double resolution, double stiffness,
-             Solver& solver) {
+bool step_on(std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double resolution,
+             const std::vector<double>& stiffness, Solver& solver) {
     Equations equations(pieces);
     for (std::size_t k = 0; k < pieces.size(); ++k)
-        if (!pieces[k].beside.empty()) equations.add(pieces, k, pulls[k], resolution, stiffness);
+        if (!pieces[k].beside.empty()) equations.add(pieces, k, pulls[k], resolution, stiffness[k]);
     const Eigen::VectorXd solution = equations.solve(solver);
     for (std::size_t k = 0; k < pieces.size(); ++k)
         if (!pieces[k].beside.empty() && solution.size() == 0) return false;
@@ -257,75 +298,120 @@ bool step_on(std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double 
     return true;
 }
 
-/// Brings them to what is like them in place and normal: iterative closest points [Besl and McKay 1992], less
-/// stiff with each step [Amberg et al. 2007]. False where there is nothing or no answer.
-bool come_from_afar(std::vector<Piece>& pieces, const Resting& resting, const Surface& surface,
-                    const CrossingGrid& crossings, const Particles& particles, Solver& solver) {
-    double size = 0.0;
-    for (const Piece& piece : pieces) size += std::sqrt(piece.size2) / static_cast<double>(pieces.size());
-    const OrientedPlaces places(surface, crossings, kTurnLength * size);
-    if (places.empty()) return false;
-    std::vector<Pull> pulls(pieces.size());
-    double least = std::numeric_limits<double>::infinity();
-    for (int step = 0; step < kMostStepsFromAfar; ++step) {
-        const Pull sum = pull_all(pulls, [&](std::size_t k) {
-            const double reach = kReach * (pieces[k].beside.empty() ? std::sqrt(pieces[k].size2) : size);
-            Pull pull = pull_from_afar(pieces[k], particles, reach, places);
-            resting.hold(k, pieces[k], pull);
+/// Brings pieces to a surface.
+class Registration {
+public:
+    Registration(const Surface& surface, const Particles& particles, std::size_t pieces)
+        : surface_(surface),
+          resolution_(surface.resolution()),
+          particles_(particles),
+          probes_(surface),
+          pulls_(pieces) {}
+
+    /// Makes the pulls by the surface's values.
+    Sight look(const std::vector<Piece>& pieces, double robust, const Resting& resting = {}) {
+        return pull_all(pulls_, [&](std::size_t k) {
+            Pull pull = pull_in_sight(pieces[k], particles_, robust, resolution_, probes_.local());
+            if (resting.rests(k)) resting.hold(k, pieces[k], pull);
             return pull;
         });
-        const double off = std::sqrt(sum.off2 / sum.samples);
-        const bool stiffer = step < static_cast<int>(kStiffnessFromAfar.size());
-        if (!stiffer && !(off < kCloser * least)) break;
-        least = off;
-        const double stiffness = stiffer ? kStiffnessFromAfar[step] : kStiffnessFromAfar.back();
-        if (!step_on(pieces, pulls, surface.resolution(), stiffness, solver)) return false;
     }
-    return true;
-}
+    double first_robust() const { return 2.0 * resolution_; }
+    const std::vector<Pull>& pulls() const { return pulls_; }
+
+    /// By the surface's values, after a look at them; they stay where they come nearest. Returns how far off
+    /// that is.
+    double settle(std::vector<Piece>& pieces, Sight sight, const std::vector<double>& stiffness,
+                  const Resting& resting = {}) {
+        std::vector<Piece> next = pieces;
+        double least = std::numeric_limits<double>::infinity();
+        for (int step = 0; sight.off() < least; ++step) {
+            const bool is_enough = sight.has_arrived(resolution_) || !(sight.off() < kBetter * least);
+            least = sight.off();
+            if (step > 0) pieces = next;
+            if (is_enough || step == kMostSteps || !step_on(next, pulls_, resolution_, stiffness, solver_))
+                break;
+            sight = look(next, std::max(resolution_, 2.0 * least), resting);
+        }
+        return least;
+    }
+
+    /// Brings some, of bodies of their own, to what is like them in place and normal: iterative closest
+    /// points [Besl and McKay 1992], less stiff with each step [Amberg et al. 2007]. False where there is
+    /// nothing or no answer.
+    bool bring_from_afar(const std::vector<char>& some, std::vector<Piece>& pieces,
+                         const CrossingGrid& crossings, const Resting& resting) {
+        double sizes = 0.0, count = 0.0;
+        for (std::size_t k = 0; k < pieces.size(); ++k) {
+            sizes += some[k] ? std::sqrt(pieces[k].size2) : 0.0;
+            count += some[k] ? 1.0 : 0.0;
+        }
+        const double size = sizes / count;
+        const OrientedPlaces places(surface_, crossings, kTurnLength * size);
+        if (places.empty()) return false;
+        std::vector<Piece> next = pieces;
+        double before = std::numeric_limits<double>::infinity();
+        for (int step = 0; step < kMostStepsFromAfar; ++step) {
+            const Sight sight = pull_all(pulls_, [&](std::size_t k) {
+                Pull pull;
+                if (resting.rests(k)) {
+                    resting.hold(k, next[k], pull);
+                } else if (some[k]) {
+                    const double of = next[k].beside.empty() ? std::sqrt(next[k].size2) : size;
+                    pull = pull_from_afar(next[k], particles_, kReach * of, places);
+                }
+                return pull;
+            });
+            const bool gets_looser = step < static_cast<int>(kStiffnessFromAfar.size());
+            if (!gets_looser && !(sight.off() < kCloser * before)) break;
+            before = sight.off();
+            const double stiffness = gets_looser ? kStiffnessFromAfar[step] : kStiffnessFromAfar.back();
+            if (!step_on(next, pulls_, resolution_, std::vector<double>(next.size(), stiffness), solver_))
+                return false;
+        }
+        for (std::size_t k = 0; k < pieces.size(); ++k)
+            if (some[k]) pieces[k] = std::move(next[k]);
+        return true;
+    }
+
+private:
+    const Surface& surface_;
+    const double resolution_;
+    const Particles& particles_;
+    ThreadProbes probes_;
+    std::vector<Pull> pulls_;
+    Solver solver_;
+};
 
 }  // namespace
 
-std::optional<std::vector<Vec3>> register_to(const Surface& surface, const CrossingGrid& crossings,
+std::optional<std::vector<Vec3>> register_to(const Surface& surface, const Crossings& crossings,
                                              const Particles& particles, const Adjacency& ring,
                                              const std::vector<Vec3>& guess) {
-    const double resolution = surface.resolution();
     std::vector<Piece> pieces = make_pieces(ring, particles.position);
     parallel_for_each(pieces.size(), 16,
                       [&](std::size_t k) { move_as(particles.position, guess, pieces[k]); });
-    ThreadProbes probes(surface);
-    std::vector<Pull> pulls(pieces.size());
-    Solver solver;
-    Resting resting;
-    std::vector<Piece> best;
-    double robust = 2.0 * resolution, stiffness = kStiffness, least = std::numeric_limits<double>::infinity();
-    for (int step = 0; step <= kMostSteps; ++step) {
-        const Pull sum = pull_all(pulls, [&](std::size_t k) {
-            Pull pull = pull_of(pieces[k], particles, robust, resolution, probes.local());
-            resting.hold(k, pieces[k], pull);
-            return pull;
-        });
-        const double off = std::sqrt(sum.off2 / sum.samples);
-        if (!(off < least)) break;
-        const bool is_enough = !(off > kArrived * resolution && off < kBetter * least);
-        if (step == 0 && is_enough) break;  // as it is
-        least = off;
-        if (step > 0) best = pieces;
-        if (is_enough) break;
-        robust = std::max(resolution, 2.0 * off);
-        if (step == 0 && sum.unseen > kUnseen * sum.samples) {
-            resting.take(pieces, pulls, resolution);
-            std::vector<Piece> come = pieces;
-            if (come_from_afar(come, resting, surface, crossings, particles, solver)) {
-                pieces = std::move(come);
-                stiffness = kStiffnessAfterwards;
-                continue;
-            }
+    Registration registration(surface, particles, pieces.size());
+    std::vector<double> stiffness(pieces.size(), kStiffness);
+    Sight sight = registration.look(pieces, registration.first_robust());
+    if (sight.has_arrived(surface.resolution())) return std::nullopt;
+    const double off = sight.off();
+    const std::vector<char> afar = out_of_sight(pieces, registration.pulls());
+    if (std::find(afar.begin(), afar.end(), 1) != afar.end()) {
+        const Resting resting(pieces, afar, registration.pulls(), surface.resolution());
+        std::vector<Piece> come = pieces;
+        if (registration.bring_from_afar(afar, come, crossings(), resting)) {
+            std::vector<double> looser = stiffness;
+            for (std::size_t k = 0; k < pieces.size(); ++k)
+                if (afar[k]) looser[k] = kStiffnessAfterwards;
+            const Sight there = registration.look(come, registration.first_robust(), resting);
+            if (registration.settle(come, there, looser, resting) < off)
+                return blended(come, particles.position);
         }
-        if (!step_on(pieces, pulls, resolution, stiffness, solver)) break;
+        sight = registration.look(pieces, registration.first_robust());
     }
-    if (best.empty()) return std::nullopt;
-    return blended(best, particles.position);
+    if (!(registration.settle(pieces, sight, stiffness) < off)) return std::nullopt;
+    return blended(pieces, particles.position);
 }
 
 }  // namespace isotrack

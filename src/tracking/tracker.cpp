@@ -374,24 +374,24 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     const SizingLimits& l = work.limits;
     TrackedFrame& frame = work.frame;
     const double apart = options.method == Method::Paper ? kDenseSeeds : kSparseSeeds;
-    {
-        const StageTimer timer(frame.seconds, "cover");
-        work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
-        work.inspector.emplace(surface, l, *work.crossings);
-    }
+    const auto crossings = [&]() -> const CrossingGrid& {
+        if (!work.crossings) work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
+        return *work.crossings;
+    };
     {
         const StageTimer timer(frame.seconds, "carry");
         if (astray()) arrange();
         if (last_mesh.ring.size() == 0) last_mesh.make_ring(particles.size());
         last_mesh.grow(particles.size());  // a frame that failed midway may have left it behind
-        const std::vector<char> found = carry(particles, last_mesh.ring, surface, *work.crossings, motion);
+        const std::vector<char> found = carry(particles, last_mesh.ring, surface, crossings, motion);
         retain(found);
         frame.lost = static_cast<std::size_t>(std::count(found.begin(), found.end(), 0));
     }
     const bool warm = !particles.empty();  // where all are lost as well, the surface is met anew
     {
         const StageTimer timer(frame.seconds, "cover");
-        if (warm) frame.seeded = cover(particles, surface, *work.crossings, l, options.seed, next_id, apart);
+        work.inspector.emplace(surface, l, crossings());
+        if (warm) frame.seeded = cover(particles, surface, crossings(), l, options.seed, next_id, apart);
     }
     if (!warm) seed(work, apart);
     work.follows =

@@ -1,5 +1,5 @@
-// Tracks two drops that merge, plain and with fit, for the thread sanitizer to watch: it ends the program at
-// the first race. Without it this is one more test of the tracker.
+// Tracks two drops that merge and then jump apart, plain and with fit, for the thread sanitizer to watch: it
+// ends the program at the first race. Without it this is one more test of the tracker.
 #include <openvdb/openvdb.h>
 #include <tbb/global_control.h>
 
@@ -26,7 +26,7 @@ int main() {
         LevelSetOptions level;
         if (fit) level.iso = 0.1 * kVoxel;  // not zero: the grid is copied and converted
         Tracker tracker(options);
-        for (const double half_distance : {0.66, 0.6, 0.55}) {
+        for (const double half_distance : {0.66, 0.6, 0.55, 1.1}) {
             const auto drops = shapes::blended_spheres({-half_distance, 0, 0}, 0.5, {half_distance, 0, 0},
                                                        0.5, 0.15, kVoxel);
             const LevelSet surface(rasterise(*drops, kVoxel), level);

@@ -10,6 +10,7 @@
 #include "isotrack/surface/rasterise.h"
 #include "isotrack/surface/shapes.h"
 #include "isotrack/tracking/tracker.h"
+#include "support/limb.h"
 #include "support/tracked.h"
 
 namespace isotrack {
@@ -77,31 +78,32 @@ TEST(MovingAndResting, LetsOneTurnBesideAnotherThatRests) {
 TEST(MovingAndResting, FollowsALimbThatSwingsFartherThanItIsThick) {
     // To and fro by some 20 voxels at its tip, which is 8 voxels thick: nothing goes on as it went, and the
     // band of the grid ends 3 voxels from the surface.
-    const auto body = shapes::ellipsoid({0, 0, 0}, {0.8, 0.6, 0.45}, kVoxel);
-    const auto limb = shapes::ellipsoid({1.4, 0, 0}, {0.9, 0.2, 0.2}, kVoxel);
-    const Vec3 joint(0.7, 0, 0);
     Tracker tracker(with_tolerance(0.2 * kVoxel));
     Eigen::Isometry3d before = Eigen::Isometry3d::Identity();
     std::size_t seen = 0, lost = 0;
     for (int f = 0; f < 6; ++f) {
-        const Eigen::Isometry3d bend =
-            Eigen::Translation3d(joint) *
-            Eigen::AngleAxisd(f % 2 == 0 ? 0.0 : 0.6, Vec3(0.1, 0.2, 1.0).normalized()) *
-            Eigen::Translation3d(-joint);
-        const LevelSet level_set(rasterise(*shapes::unite({body, shapes::moved(limb, bend)}), kVoxel));
+        const Eigen::Isometry3d bend = support::limb_bend(f % 2 == 0 ? 0.0 : 0.6);
+        const LevelSet level_set(rasterise(*support::with_limb(bend, kVoxel), kVoxel));
         const TrackedFrame frame = tracker.advance(level_set);
         support::expect_sound(frame, 1, 2, "frame " + std::to_string(f));
-        double off = 0.0, moved = 0.0;
+        double off = 0.0, moved = 0.0, crept = 0.0;
+        std::size_t resting = 0;
         for (std::size_t v = 0; v < frame.mesh.points.size(); ++v) {
-            const Vec3& p = frame.mesh.points[v];
+            const Vec3 &p = frame.mesh.points[v], &velocity = frame.mesh.velocities[v];
             const Vec3 at_rest = bend.inverse() * p;
-            if (at_rest.x() < 1.0) continue;
-            const Vec3 truth = p - before * at_rest;
-            off += (frame.mesh.velocities[v] - truth).norm();
-            moved += truth.norm();
+            if (at_rest.x() > 1.0) {
+                const Vec3 truth = p - before * at_rest;
+                off += (velocity - truth).norm();
+                moved += truth.norm();
+            } else if (p.x() < 0.0) {
+                ++resting;
+                crept += velocity.norm();
+            }
         }
         if (f > 0) {
             EXPECT_LT(off, 0.15 * moved) << f;
+            EXPECT_GT(resting, 100u);
+            EXPECT_LT(crept, 0.4 * kVoxel * static_cast<double>(resting)) << f;
             seen += frame.particles;
             lost += frame.lost;
         }
