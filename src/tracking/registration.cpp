@@ -273,7 +273,7 @@ private:
     Eigen::VectorXd right_;
 };
 
-/// Takes a step; false where there is no answer.
+/// Takes a step, with the stiffness that each has; false where there is no answer.
 bool step_on(std::vector<Piece>& pieces, const std::vector<Pull>& pulls, double resolution,
              const std::vector<double>& stiffness, Solver& solver) {
     Equations equations(pieces);
@@ -308,15 +308,18 @@ public:
           probes_(surface),
           pulls_(pieces) {}
 
-    /// Makes the pulls by the surface's values.
-    Sight look(const std::vector<Piece>& pieces, double robust, const Resting& resting = {}) {
+    /// Makes the pulls by the surface's values. What is farther off than `robust` counts less.
+    Sight look(const std::vector<Piece>& pieces, double robust, const Resting& resting) {
         return pull_all(pulls_, [&](std::size_t k) {
             Pull pull = pull_in_sight(pieces[k], particles_, robust, resolution_, probes_.local());
             if (resting.rests(k)) resting.hold(k, pieces[k], pull);
             return pull;
         });
     }
-    double first_robust() const { return 2.0 * resolution_; }
+    /// The same for the first time.
+    Sight look(const std::vector<Piece>& pieces, const Resting& resting = {}) {
+        return look(pieces, 2.0 * resolution_, resting);
+    }
     const std::vector<Pull>& pulls() const { return pulls_; }
 
     /// By the surface's values, after a look at them; they stay where they come nearest. Returns how far off
@@ -393,7 +396,7 @@ std::optional<std::vector<Vec3>> register_to(const Surface& surface, const Cross
                       [&](std::size_t k) { move_as(particles.position, guess, pieces[k]); });
     Registration registration(surface, particles, pieces.size());
     std::vector<double> stiffness(pieces.size(), kStiffness);
-    Sight sight = registration.look(pieces, registration.first_robust());
+    Sight sight = registration.look(pieces);
     if (sight.has_arrived(surface.resolution())) return std::nullopt;
     const double off = sight.off();
     const std::vector<char> afar = out_of_sight(pieces, registration.pulls());
@@ -404,11 +407,11 @@ std::optional<std::vector<Vec3>> register_to(const Surface& surface, const Cross
             std::vector<double> looser = stiffness;
             for (std::size_t k = 0; k < pieces.size(); ++k)
                 if (afar[k]) looser[k] = kStiffnessAfterwards;
-            const Sight there = registration.look(come, registration.first_robust(), resting);
+            const Sight there = registration.look(come, resting);
             if (registration.settle(come, there, looser, resting) < off)
                 return blended(come, particles.position);
         }
-        sight = registration.look(pieces, registration.first_robust());
+        sight = registration.look(pieces);
     }
     if (!(registration.settle(pieces, sight, stiffness) < off)) return std::nullopt;
     return blended(pieces, particles.position);

@@ -6,23 +6,17 @@
 #include <algorithm>
 #include <vector>
 
-#include "isotrack/meshing/convection.h"
 #include "isotrack/surface/shapes.h"
-#include "support/samples.h"
-#include "tracking/last_mesh.h"
+#include "support/ringed_samples.h"
 
 namespace isotrack {
 namespace {
 
-struct Sampled : support::Samples {
-    Adjacency ring;
+struct Sampled : support::RingedSamples {
     std::vector<Piece> pieces;
 
-    explicit Sampled(const shapes::SurfacePtr& surface, double edge) : Samples(*surface, edge) {
-        const CellLabels labels = guided_convection(cells, particles.position, particles.normal, *surface);
-        ring = ring_of(particle_triangles(carve(cells, labels, particles.position)), particles.size());
-        pieces = make_pieces(ring, particles.position);
-    }
+    Sampled(const shapes::SurfacePtr& surface, double edge)
+        : RingedSamples(surface, edge), pieces(make_pieces(ring, particles.position)) {}
 };
 
 /// One with some pieces, and a drop that is one of its own.

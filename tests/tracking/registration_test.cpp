@@ -10,13 +10,11 @@
 #include <stdexcept>
 #include <vector>
 
-#include "isotrack/meshing/convection.h"
 #include "isotrack/surface/level_set.h"
 #include "isotrack/surface/rasterise.h"
 #include "isotrack/surface/shapes.h"
 #include "support/limb.h"
-#include "support/samples.h"
-#include "tracking/last_mesh.h"
+#include "support/ringed_samples.h"
 
 namespace isotrack {
 namespace {
@@ -29,13 +27,8 @@ Eigen::Isometry3d motion_by(double degrees, const Vec3& axis, const Vec3& shift)
            Eigen::AngleAxisd(degrees * 3.14159265358979 / 180.0, axis.normalized());
 }
 
-struct Sampled : support::Samples {
-    Adjacency ring;
-
-    explicit Sampled(const SurfacePtr& surface, double edge = 0.12) : Samples(*surface, edge) {
-        const CellLabels labels = guided_convection(cells, particles.position, particles.normal, *surface);
-        ring = ring_of(particle_triangles(carve(cells, labels, particles.position)), particles.size());
-    }
+struct Sampled : support::RingedSamples {
+    explicit Sampled(const SurfacePtr& surface, double edge = 0.12) : RingedSamples(surface, edge) {}
 };
 
 std::optional<std::vector<Vec3>> register_on(const Surface& surface, const Sampled& sampled,
