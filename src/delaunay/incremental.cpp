@@ -2,187 +2,88 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cstdint>
 #include <numeric>
-#include <unordered_map>
 #include <utility>
 
-#include "delaunay/filters.h"
+#include "delaunay/simultaneous_insertion.h"
 #include "delaunay/spatial_order.h"
+#include "parallel_for_each.h"
 #include "room.h"
+#include "thread_count.h"
 
 namespace isotrack {
 namespace {
 
-constexpr int kNone = -1;
-constexpr char kUnseen = 0, kConflict = 1, kRim = 2, kFree = 3;
+using Step = Insertion<LoneMarks>;
 
-bool infinite(const std::array<int, 4>& v) {
-    return (v[0] | v[1] | v[2] | v[3]) < 0;
+constexpr std::size_t kGrain = 4096;  // cells, or vertices
+
+/// For cells of so many vertices.
+std::size_t room_for(std::size_t vertices, int threads) {
+    constexpr std::size_t kCells = 7;  // per vertex of a sampled surface, about
+    return kCells * vertices + (threads > 1 ? SimultaneousInsertion::slack(threads) : 0);
 }
 
-int index_in(const std::array<int, 4>& v, int vertex) {
-    return (v[1] == vertex) + 2 * (v[2] == vertex) + 3 * (v[3] == vertex);  // no branches to mispredict
+/// The even permutations of four: entry j is that which was entry `from[n][j]`, and what was entry k is entry
+/// `to[n][k]`.
+struct EvenPermutations {
+    int from[12][4], to[12][4];
+};
+constexpr EvenPermutations even_permutations() {
+    EvenPermutations result{};
+    for (int n = 0; n < 12; ++n)
+        for (int j = 0; j < 4; ++j) {
+            const int from = j == 0 ? n / 3 : Tetrahedra::kFacet[n / 3][(n + j - 1) % 3];
+            result.from[n][j] = from;
+            result.to[n][from] = j;
+        }
+    return result;
+}
+constexpr EvenPermutations kEven = even_permutations();
+
+/// The one with which the smallest vertex comes first and the smallest of the others next, where the infinite
+/// vertex is the largest.
+int even_permutation_of(const std::array<int, 4>& v) {
+    // Numbers with their entries in the lowest bits: the least of some is found without a branch.
+    const auto entry = [&](int k) {
+        return std::uint64_t{static_cast<unsigned>(v[k])} << 2 | static_cast<unsigned>(k);
+    };
+    const int first = std::min(std::min(entry(0), entry(1)), std::min(entry(2), entry(3))) & 3;
+    const auto& others = Tetrahedra::kFacet[first];
+    const auto other = [&](int r) {
+        return std::uint64_t{static_cast<unsigned>(v[others[r]])} << 2 | static_cast<unsigned>(r);
+    };
+    const int next = std::min(std::min(other(0), other(1)), other(2)) & 3;
+    return 3 * first + next;
 }
 
 }  // namespace
 
-int IncrementalDelaunay::locate(const Vec3& p, int start) const {
-    int cell = start, from = -1;
-    if (infinite(cells_.vertices[cell]))
-        cell = cells_.neighbour(cell, index_in(cells_.vertices[cell], Tetrahedra::kInfinite));
-    for (;;) {
-        const auto& v = cells_.vertices[cell];
-        if (infinite(v)) return cell;
-        int exit = -1;
-        for (int k = 0; k < 4 && exit < 0; ++k) {
-            if (k == from) continue;
-            const Vec3* q[4] = {&points[v[0]], &points[v[1]], &points[v[2]], &points[v[3]]};
-            q[k] = &p;
-            if (filtered_orientation(*q[0], *q[1], *q[2], *q[3]) < 0) exit = k;
-        }
-        if (exit < 0) return cell;
-        const int link = cells_.links[cell][exit];
-        cell = link >> 2;
-        from = link & 3;
-    }
+int IncrementalDelaunay::locate(const Vec3& p, int start) {
+    return insertion().locate(p, start);
 }
 
-int IncrementalDelaunay::vertex_at(const Vec3& p, int cell) const {
-    for (const int v : cells_.vertices[cell])
-        if (v >= 0 && points[v] == p) return v;
-    return -1;
+int IncrementalDelaunay::vertex_at(const Vec3& p, int cell) {
+    return insertion().vertex_at(p, cell);
 }
 
-bool IncrementalDelaunay::in_conflict(int cell, const Vec3& p) const {
-    const auto& v = cells_.vertices[cell];
-    if (!infinite(v)) return filtered_in_sphere(points[v[0]], points[v[1]], points[v[2]], points[v[3]], p);
-    const int k = index_in(v, Tetrahedra::kInfinite);
-    const Vec3* q[4] = {&p, &p, &p, &p};
-    for (int j = 0; j < 4; ++j)
-        if (j != k) q[j] = &points[v[j]];
-    const int side = filtered_orientation(*q[0], *q[1], *q[2], *q[3]);
-    // In the plane of the facet the circle decides, in which that plane cuts the sphere of the cell behind
-    // it.
-    return side != 0 ? side > 0 : in_conflict(cells_.neighbour(cell, k), p);
+bool IncrementalDelaunay::in_conflict(int cell, const Vec3& p) {
+    return insertion().in_conflict(cell, p);
 }
 
 void IncrementalDelaunay::insert(int vertex, int cell) {
     fill_hole(vertex, cell);
-    for (const int slot : freed_) blank(slot);
-}
-
-/// Finds the cells in conflict with the vertex, `freed_`, and the facets around them, `rim_`.
-void IncrementalDelaunay::dig(int vertex, int cell) {
-    const Vec3& p = points[vertex];
-    // What may belong to a list is written to its end in any case, and counted if it does: a branch on it
-    // could not be predicted.
-    constexpr std::size_t kRoom = 64;  // more than most holes need
-    if (freed_.size() < kRoom) freed_.resize(kRoom);
-    if (rim_.size() < kRoom) rim_.resize(kRoom);
-    std::size_t in_hole = 0, in_rim = 0;
-    // Locals, because a write to a char might be one to anything else.
-    char* const marks = marks_.data();
-    const auto* const links = cells_.links.data();
-    int* hole = freed_.data();  // links: into the cells in conflict, each from the one it was found from
-    Facet* around = rim_.data();
-    const auto cross = [&](int from, int k) {
-        const int link = links[from][k], other = link >> 2;
-        char mark = marks[other];
-        if (mark == kUnseen) {
-            const bool conflict = in_conflict(other, p);
-            mark = marks[other] = static_cast<char>(kRim - conflict);
-            hole[in_hole] = link;
-            in_hole += conflict;
-        }
-        around[in_rim] = {from, k};
-        in_rim += mark == kRim;
-    };
-    static_assert(kRim - 1 == kConflict);
-    constexpr int kOthers[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
-    marks[cell] = kConflict;
-    hole[in_hole++] = Tetrahedra::link(cell, 0);  // as if found across facet 0, so that is crossed here
-    cross(cell, 0);
-    for (std::size_t i = 0; i < in_hole; ++i) {
-        if (in_hole + 3 > freed_.size()) {
-            freed_.resize(2 * freed_.size());
-            hole = freed_.data();
-        }
-        if (in_rim + 3 > rim_.size()) {
-            rim_.resize(2 * rim_.size());
-            around = rim_.data();
-        }
-        const int from = hole[i] >> 2, back = hole[i] & 3;
-        for (const int k : kOthers[back]) cross(from, k);
-        hole[i] = from;
-    }
-    freed_.resize(in_hole);
-    rim_.resize(in_rim);
+    for (const int slot : room_.freed) blank(slot);
 }
 
 /// As `insert`, but the slots that are freed are not blank: their cells stay there, and their marks.
 void IncrementalDelaunay::fill_hole(int vertex, int cell) {
-    dig(vertex, cell);
-    // A cell on every facet of the rim. They meet at the facets between the new vertex and the edges of the
-    // rim, each of which two facets have, in opposite directions.
-    fresh_.resize(rim_.size());
-    for (int& slot : fresh_) slot = new_slot();
-    const std::size_t count = rim_.size() / 2 + 2;  // of vertices on the rim, by Euler's formula
-    constexpr std::size_t kMostInTable = 256;       // a vertex far outside sees half the hull
-    if (count <= kMostInTable) {
-        if (edges_.size() < count * count) edges_.resize(count * count);
-        int* const table = edges_.data();
-        connect(vertex, count, [&](int from, int to) -> int& { return table[count * from + to]; });
-    } else {
-        std::unordered_map<std::size_t, int> many;
-        connect(vertex, count, [&](int from, int to) -> int& { return many[count * from + to]; });
-    }
-    free_.insert(free_.end(), freed_.begin(), freed_.end());
-}
-
-/// Makes the cells of `fresh_`, one on every facet of the rim. `edge(a, b)` is a place for the link across
-/// the edge from the a-th of the `count` vertices on the rim to the b-th.
-template <typename Edge>
-void IncrementalDelaunay::connect(int vertex, std::size_t count, const Edge& edge) {
-    if (corner_of_.size() < points.size() + 1) corner_of_.resize(points.size() + 1, kNone);
-    corners_.resize(count);
-    on_rim_.resize(rim_.size());
-    int* const corner_of = corner_of_.data() + 1;  // the infinite vertex may be on the rim
-    int* const corners = corners_.data();
-    char* const marks = marks_.data();
-    auto* const vertices = cells_.vertices.data();
-    auto* const links = cells_.links.data();
-    int found = 0;
-    const auto corner = [&](int v) {
-        int& number = corner_of[v];
-        if (number == kNone) {
-            assert(static_cast<std::size_t>(found) < count);
-            number = found;
-            corners[found++] = v;
-        }
-        return number;
-    };
-    for (std::size_t i = 0; i < rim_.size(); ++i) {
-        const Facet facet = rim_[i];
-        const auto& f = Tetrahedra::kFacet[facet.k];
-        const int slot = fresh_[i], outside = links[facet.cell][facet.k];
-        std::array<int, 4> v = vertices[facet.cell];
-        const std::array<int, 3> c{corner(v[f[0]]), corner(v[f[1]]), corner(v[f[2]])};
-        on_rim_[i] = c;
-        v[facet.k] = vertex;
-        vertices[slot] = v;
-        links[slot][facet.k] = outside;
-        links[outside >> 2][outside & 3] = Tetrahedra::link(slot, facet.k);
-        marks[slot] = marks[outside >> 2] = kUnseen;
-        for (int j = 0; j < 3; ++j) edge(c[j], c[(j + 1) % 3]) = Tetrahedra::link(slot, f[(j + 2) % 3]);
-    }
-    assert(static_cast<std::size_t>(found) == count);
-    for (std::size_t i = 0; i < rim_.size(); ++i) {
-        const auto& f = Tetrahedra::kFacet[rim_[i].k];
-        const auto& c = on_rim_[i];
-        auto& own = links[fresh_[i]];
-        for (int j = 0; j < 3; ++j) own[f[(j + 2) % 3]] = edge(c[(j + 1) % 3], c[j]);
-    }
-    for (const int w : corners_) corner_of[w] = kNone;
+    insertion().dig(vertex, cell);
+    room_.fresh.resize(room_.rim.size());
+    for (int& slot : room_.fresh) slot = new_slot();
+    insertion().fill(vertex);
+    free_.insert(free_.end(), room_.freed.begin(), room_.freed.end());
 }
 
 int IncrementalDelaunay::new_slot() {
@@ -196,7 +97,7 @@ int IncrementalDelaunay::new_slot() {
     ensure_room(marks_);
     cells_.vertices.emplace_back();
     cells_.links.emplace_back();
-    marks_.push_back(kUnseen);
+    marks_.push_back(cell_mark::kUnseen);
     assert(cells_.size() <= Tetrahedra::kMostCells);
     return static_cast<int>(cells_.size()) - 1;
 }
@@ -210,7 +111,7 @@ void IncrementalDelaunay::free_slot(int slot) {
 void IncrementalDelaunay::blank(int slot) {
     cells_.vertices[slot].fill(Tetrahedra::kInfinite);
     for (int k = 0; k < 4; ++k) cells_.links[slot][k] = Tetrahedra::link(slot, k);
-    marks_[slot] = kUnseen;
+    marks_[slot] = cell_mark::kUnseen;
 }
 
 /// Finds four vertices that span a volume and makes the five cells they have.
@@ -245,78 +146,142 @@ bool IncrementalDelaunay::start(const std::vector<int>& order, std::array<int, 4
         for (int j = 0; j < 4; ++j)
             if (j != k) {
                 // Two of the infinite cells share the facet without either's vertex of the first cell.
-                const int mine = index_in(cells_.vertices[1 + k], first[j]),
-                          its = index_in(cells_.vertices[1 + j], first[k]);
+                const int mine = Step::index_in(cells_.vertices[1 + k], first[j]),
+                          its = Step::index_in(cells_.vertices[1 + j], first[k]);
                 cells_.links[1 + k][mine] = Tetrahedra::link(1 + j, its);
             }
     return true;
 }
 
-void IncrementalDelaunay::build(std::vector<int>& chosen) {
-    constexpr std::size_t kCells = 7;  // per vertex of a sampled surface, about
-    const std::size_t cells = kCells * chosen.size();
-    clear_for(cells_.vertices, cells);
-    clear_for(cells_.links, cells);
-    clear_for(marks_, cells);
+/// Takes away all cells and makes the first five. False where the vertices span no volume. `room`: cells.
+bool IncrementalDelaunay::start_anew(const std::vector<int>& order, std::size_t room,
+                                     std::array<int, 4>& first) {
+    clear_for(cells_.vertices, room);
+    clear_for(cells_.links, room);
+    clear_for(marks_, room);
     free_.clear();
-    std::vector<int> order = chosen;
-    sort_spatially(points, order);
-    std::array<int, 4> first;
-    if (!start(order, first)) return;
-    int near = 0;
+    return start(order, first);
+}
+
+/// Adds vertices one after another. Returns those that are on the place of another.
+std::vector<int> IncrementalDelaunay::add(const int* begin, const int* end, int near) {
     std::vector<int> twice;
-    for (const int v : order) {
-        if (std::find(first.begin(), first.end(), v) != first.end()) continue;
-        const int cell = locate(points[v], near);
-        if (vertex_at(points[v], cell) >= 0) {
-            twice.push_back(v);
+    for (; begin != end; ++begin) {
+        const Vec3& p = points[*begin];
+        const int cell = locate(p, near);
+        if (vertex_at(p, cell) >= 0) {
+            twice.push_back(*begin);
             near = cell;
             continue;
         }
-        fill_hole(v, cell);
-        near = fresh_.front();
+        fill_hole(*begin, cell);
+        near = room_.fresh.front();
     }
-    for (const int slot : free_) blank(slot);  // the others were used again at once
-    if (!twice.empty()) {
+    return twice;
+}
+
+/// Adds vertices by several threads. False, and not all are there, where some are on the place of others.
+bool IncrementalDelaunay::add_simultaneously(const std::vector<int>& order, int threads) {
+    constexpr std::ptrdiff_t kAlone = 1000;  // vertices, at most: in a small DT all are in each other's way
+    const int *const begin = order.data(), *const end = begin + order.size();
+    std::vector<const int*> rounds{end};
+    while (rounds.back() - begin > kAlone) {
+        const auto count = static_cast<double>(rounds.back() - begin);
+        rounds.push_back(begin + static_cast<std::ptrdiff_t>(kRoundShare * count));
+    }
+    if (!add(begin, rounds.back(), 0).empty()) return false;
+    SimultaneousInsertion insertion(points, cells_, marks_, free_, room_for(order.size(), threads), threads);
+    for (std::size_t r = rounds.size() - 1; r > 0; --r)
+        if (!insertion.add(rounds[r], rounds[r - 1])) return false;
+    const std::vector<int> left = insertion.finish();
+    const auto is_cell = [](char mark) { return mark == cell_mark::kUnseen; };
+    const auto near = std::find_if(marks_.begin(), marks_.end(), is_cell) - marks_.begin();
+    return add(left.data(), left.data() + left.size(), static_cast<int>(near)).empty();
+}
+
+void IncrementalDelaunay::build(std::vector<int>& chosen, int threads) {
+    constexpr std::size_t kPerThread = 1000;  // vertices, at least
+    if (threads == 0) threads = thread_count();
+    threads = static_cast<int>(std::min<std::size_t>(threads, chosen.size() / kPerThread));
+    std::vector<int> order = chosen;
+    sort_spatially(points, order);
+    std::array<int, 4> first;
+    const std::size_t room = room_for(order.size(), threads);
+    if (!start_anew(order, room, first)) return;
+    const auto is_first = [&](int v) { return std::find(first.begin(), first.end(), v) != first.end(); };
+    order.erase(std::remove_if(order.begin(), order.end(), is_first), order.end());
+    if (threads < 2 || !add_simultaneously(order, threads)) {
+        if (threads > 1) start_anew({first.begin(), first.end()}, room, first);
+        std::vector<int> twice = add(order.data(), order.data() + order.size(), 0);
         std::sort(twice.begin(), twice.end());
         const auto is_twice = [&](int v) { return std::binary_search(twice.begin(), twice.end(), v); };
         chosen.erase(std::remove_if(chosen.begin(), chosen.end(), is_twice), chosen.end());
     }
+    for (const int slot : free_) blank(slot);  // the others were used again at once
 }
 
-/// Numbers the cells anew, by their first vertices: those that are near each other in memory are so in space
-/// as far as the points are.
+/// Numbers the cells anew, by their vertices, and puts these in order: those that are near each other in
+/// memory are so in space as far as the points are, and who came first does not show.
 void IncrementalDelaunay::arrange() {
     const std::size_t slots = cells_.size();
-    const auto key = [&](std::size_t c) {  // that of the infinite vertex is the largest
-        const auto& v = cells_.vertices[c];
-        return std::min(std::min(static_cast<unsigned>(v[0]), static_cast<unsigned>(v[1])),
-                        std::min(static_cast<unsigned>(v[2]), static_cast<unsigned>(v[3])));
+    for (const int slot : free_) marks_[slot] = cell_mark::kFree;
+    // The mark of a cell is the permutation of its vertices from here on.
+    parallel_for_each(slots, kGrain, [&](std::size_t c) {
+        if (marks_[c] == cell_mark::kFree) return;
+        const std::array<int, 4> v = cells_.vertices[c];
+        const int n = even_permutation_of(v);
+        marks_[c] = static_cast<char>(n);
+        for (int j = 0; j < 4; ++j) cells_.vertices[c][j] = v[kEven.from[n][j]];
+    });
+    const auto for_each_cell = [&](const auto& visit) {
+        for (std::size_t c = 0; c < slots; ++c)
+            if (marks_[c] != cell_mark::kFree) visit(static_cast<int>(c), cells_.vertices[c][0]);
     };
-    for (const int slot : free_) marks_[slot] = kFree;
-    std::vector<int> next(points.size() + 1, 0);
-    for (std::size_t c = 0; c < slots; ++c)
-        if (marks_[c] == kUnseen) ++next[key(c) + 1];
-    std::partial_sum(next.begin(), next.end(), next.begin());
-    std::vector<int> number(slots);
-    const std::size_t cells = slots - free_.size();
-    int behind = static_cast<int>(cells);  // free ones are
-    for (std::size_t c = 0; c < slots; ++c) number[c] = marks_[c] == kUnseen ? next[key(c)]++ : behind++;
-    for (auto& links : cells_.links)
-        for (int& link : links) link = Tetrahedra::link(number[link >> 2], link & 3);
+    std::vector<int> end(points.size() + 1, 0);  // of the cells that have a vertex first
+    for_each_cell([&](int, int vertex) { ++end[vertex + 1]; });
+    std::partial_sum(end.begin(), end.end(), end.begin());
+    const std::size_t cells = end.back();
+    std::vector<int> order(cells), number(slots);
+    for_each_cell([&](int c, int vertex) { order[end[vertex]++] = c; });
+    parallel_for_each(points.size(), kGrain, [&](std::size_t v) {
+        // By their next two vertices: an oriented facet has one cell behind it.
+        thread_local std::vector<std::pair<std::uint64_t, int>> those;
+        those.clear();
+        const int begin = v == 0 ? 0 : end[v - 1];
+        for (int n = begin; n < end[v]; ++n) {
+            const auto next = static_cast<unsigned>(cells_.vertices[order[n]][1]),
+                       after = static_cast<unsigned>(cells_.vertices[order[n]][2]);
+            those.emplace_back(std::uint64_t{next} << 32 | after, order[n]);
+        }
+        std::sort(those.begin(), those.end());
+        int n = begin;
+        for (const auto& [key, c] : those) {
+            order[n] = c;
+            number[c] = n++;
+        }
+    });
+    parallel_for_each(slots, kGrain, [&](std::size_t c) {
+        if (marks_[c] == cell_mark::kFree) return;
+        const std::array<int, 4> links = cells_.links[c];
+        const int n = marks_[c];
+        for (int j = 0; j < 4; ++j) {
+            const int link = links[kEven.from[n][j]], other = link >> 2, m = marks_[other];
+            cells_.links[c][j] = Tetrahedra::link(number[other], kEven.to[m][link & 3]);
+        }
+    });
     // One number of each after the other, for with all twice a DT would take its most memory here; and back,
     // so that each stays where it is: places that change would leave holes.
-    std::vector<int> ordered(slots);
+    std::vector<int>& ordered = number;
     const auto put_in_order = [&](std::vector<std::array<int, 4>>& values) {
         for (int k = 0; k < 4; ++k) {
-            for (std::size_t c = 0; c < slots; ++c) ordered[number[c]] = values[c][k];
-            for (std::size_t c = 0; c < cells; ++c) values[c][k] = ordered[c];
+            parallel_for_each(cells, kGrain, [&](std::size_t n) { ordered[n] = values[order[n]][k]; });
+            parallel_for_each(cells, kGrain, [&](std::size_t n) { values[n][k] = ordered[n]; });
         }
         values.resize(cells);
     };
     put_in_order(cells_.vertices);
     put_in_order(cells_.links);
-    marks_.assign(cells_.size(), kUnseen);
+    marks_.assign(cells, cell_mark::kUnseen);
     free_.clear();
 }
 

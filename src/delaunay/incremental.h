@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "delaunay/insertion.h"
 #include "isotrack/delaunay/tetrahedralisation.h"
 
 namespace isotrack {
@@ -22,25 +23,27 @@ public:
     bool empty() const { return cells_.size() == 0; }
 
     /// The DT of the vertices in `chosen`, from which those are taken that are on the place of another; none
-    /// are taken and there are no cells when they span no volume.
-    void build(std::vector<int>& chosen);
-    /// After `build`: leaves no slot free and makes cells neighbours in memory as far as their vertices are.
+    /// are taken and there are no cells when they span no volume. `threads`: so many add vertices at most, 0
+    /// for all that there are; then the slots of the cells depend on the hour, until `arrange`.
+    void build(std::vector<int>& chosen, int threads);
+    /// After `build`: leaves no slot free, makes cells neighbours in memory as far as their vertices are, and
+    /// their numbers and the order of their vertices depend on the points alone.
     void arrange();
 
     /// A cell that has the place of a vertex in it or on it, infinite when it is outside the hull. `start`: a
     /// cell near by.
-    int locate(const Vec3& p, int start) const;
+    int locate(const Vec3& p, int start);
     /// The vertex of `cell` at p, or -1.
-    int vertex_at(const Vec3& p, int cell) const;
+    int vertex_at(const Vec3& p, int cell);
 
     /// Adds a vertex, located in `cell` and not at a vertex of it. `fresh()` and `freed()` are then the slots
     /// of the cells that came and went.
     void insert(int vertex, int cell);
-    const std::vector<int>& fresh() const { return fresh_; }
-    const std::vector<int>& freed() const { return freed_; }
+    const std::vector<int>& fresh() const { return room_.fresh; }
+    const std::vector<int>& freed() const { return room_.freed; }
 
     /// Is p inside the cell's sphere, or beyond the facet of an infinite cell?
-    bool in_conflict(int cell, const Vec3& p) const;
+    bool in_conflict(int cell, const Vec3& p);
 
     /// For changes from outside: a slot to write to, one that is given back, and the arrays themselves.
     int new_slot();
@@ -49,22 +52,17 @@ public:
 
 private:
     bool start(const std::vector<int>& order, std::array<int, 4>& first);
-    void dig(int vertex, int cell);
+    bool start_anew(const std::vector<int>& order, std::size_t room, std::array<int, 4>& first);
+    std::vector<int> add(const int* begin, const int* end, int near);
+    bool add_simultaneously(const std::vector<int>& order, int threads);
     void fill_hole(int vertex, int cell);
-    template <typename Edge>
-    void connect(int vertex, std::size_t count, const Edge& edge);
     void blank(int slot);
+    Insertion<LoneMarks> insertion() { return {points, cells_, LoneMarks(marks_.data()), room_}; }
 
     Tetrahedra cells_;
     std::vector<int> free_;
     std::vector<char> marks_;
-    struct Facet {
-        int cell, k;
-    };
-    std::vector<Facet> rim_;
-    std::vector<int> fresh_, freed_;
-    std::vector<int> corners_, corner_of_, edges_;
-    std::vector<std::array<int, 3>> on_rim_;  // the corners of each facet of the rim
+    InsertionRoom room_;
 };
 
 }  // namespace isotrack

@@ -38,12 +38,12 @@ FacetKey facet_of(const std::array<int, 4>& v, int k) {
 
 }  // namespace
 
-void LivingDelaunay::assign(const std::vector<Vec3>& points, const std::vector<char>& there) {
+void LivingDelaunay::assign(const std::vector<Vec3>& points, const std::vector<char>& there, int threads) {
     dt_.points.clear();
     reserve_with_slack(dt_.points, points.size());
     dt_.points = points;
     there_ = there.empty() ? std::vector<char>(points.size(), 1) : there;
-    rebuild();
+    rebuild(threads);
 }
 
 void LivingDelaunay::clear() {
@@ -52,12 +52,12 @@ void LivingDelaunay::clear() {
     profile_ = profile;
 }
 
-void LivingDelaunay::rebuild() {
+void LivingDelaunay::rebuild(int threads) {
     const Clocked clock(profile_.build);
     std::vector<int> numbers;
     for (std::size_t v = 0; v < there_.size(); ++v)
         if (there_[v]) numbers.push_back(static_cast<int>(v));
-    dt_.build(numbers);
+    dt_.build(numbers, threads);
     dt_.arrange();
     size_ = numbers.size();
     std::fill(there_.begin(), there_.end(), 0);
@@ -139,7 +139,7 @@ bool LivingDelaunay::fill_star(int number) {
     hole_.points.clear();
     for (const int v : link) hole_.points.push_back(dt_.points[v]);
     std::vector<int> all = numbers_below(link.size());
-    hole_.build(all);
+    hole_.build(all, 1);
     const Tetrahedra& filling = hole_.cells();
 
     // From outside the star every facet of its rim is found again among those of the filling.

@@ -13,8 +13,9 @@ namespace isotrack {
 class LivingDelaunay {
 public:
     /// Starts anew with vertex i at points[i], where `there` (all when empty) is set; of several points on
-    /// one place one has a vertex, or all while there are no cells.
-    void assign(const std::vector<Vec3>& points, const std::vector<char>& there = {});
+    /// one place one has a vertex, or all while there are no cells. `threads`: so many add vertices at most,
+    /// 0 for all that there are.
+    void assign(const std::vector<Vec3>& points, const std::vector<char>& there, int threads);
     /// Without vertices and cells, and frees their memory.
     void clear();
     /// False when another vertex is on that very place; the number has then no vertex. `near`: the number of
@@ -49,7 +50,7 @@ public:
     const UpdateProfile& profile() const { return profile_; }  ///< Since the first `assign`.
 
 private:
-    void rebuild();
+    void rebuild(int threads = 1);
     const std::vector<int>& star_of(int number) const;
     void place(int number, int cell);
     void note(const std::vector<int>& slots);

@@ -27,7 +27,9 @@ struct ByNumber {
 }  // namespace
 
 void sort_spatially(const std::vector<Vec3>& points, std::vector<int>& order) {
-    CGAL::spatial_sort<CGAL::Parallel_tag>(order.begin(), order.end(), ByNumber{points});
+    constexpr int kUsual = 0;  // of the fewest that are sorted, and of the fewest of a round
+    CGAL::spatial_sort<CGAL::Parallel_tag>(order.begin(), order.end(), ByNumber{points},
+                                           CGAL::Hilbert_sort_median_policy(), kUsual, kUsual, kRoundShare);
 }
 
 void sort_along_curve(const std::vector<Vec3>& points, std::vector<int>& order) {

@@ -7,8 +7,11 @@
 
 namespace isotrack {
 
-/// Sorts numbers of points so that one is near the one before, but for a random eighth of them, which come
-/// first and are sorted so in turn (Amenta, Choi and Rote 2003). Depends on the points and `order` alone; uses TBB inside.
+constexpr double kRoundShare = 0.125;
+
+/// Sorts numbers of points so that one is near the one before, but for a random `kRoundShare` of them, which
+/// come first and are sorted so in turn (Amenta, Choi and Rote 2003). Depends on the points and `order`
+/// alone; uses TBB inside.
 void sort_spatially(const std::vector<Vec3>& points, std::vector<int>& order);
 
 /// The same in one round: along Hilbert's curve.

@@ -17,10 +17,10 @@ constexpr int kBroken = 2, kNotDelaunay = 1, kLimit = 4;
 /// What all strategies share: the true positions, and the DT that follows them.
 class Follower : public Tetrahedralisation {
 public:
-    void assign(const std::vector<Vec3>& points) override {
+    void assign(const std::vector<Vec3>& points, int threads) override {
         points_ = points;
         there_.assign(points.size(), 1);
-        dt_.assign(points);
+        dt_.assign(points, there_, threads);
         assigned();
     }
     void clear() override {
@@ -187,7 +187,7 @@ public:
     void settle() override {
         if (inserted_ + moved_ + removed_ == 0) return;
         if (always_rebuild_ || building_pays(inserted_, moved_, removed_, dt_.size()))
-            dt_.assign(points_, there_);
+            dt_.assign(points_, there_, 0);
         else
             update();
         assigned();
@@ -227,7 +227,7 @@ Tetrahedra tetrahedralise(const std::vector<Vec3>& points) {
     IncrementalDelaunay dt;
     dt.points = points;
     std::vector<int> all = numbers_below(points.size());
-    dt.build(all);
+    dt.build(all, 0);
     dt.arrange();
     return std::move(dt.slots());
 }

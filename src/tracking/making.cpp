@@ -43,10 +43,13 @@ void Tracker::Impl::Making::mesh_particles() {
         std::function<void()> measure_expected;
         if (!options().fit && !in_paper())
             measure_expected = inspector.expect(particles().position, last_mesh.triangles);
-        tracker_.tetrahedralise(true, work_.frame.seconds, [&] {
-            if (measure_expected) measure_expected();
-            tracker_.prepare_topology(work_);
-        });
+        tracker_.tetrahedralise(
+            true, work_.frame.seconds,
+            [&] {
+                if (measure_expected) measure_expected();
+                tracker_.prepare_topology(work_);
+            },
+            measure_expected ? 1 : 0);
         // The last mesh is of no more use, and the most memory is needed from now on.
         last_mesh.take({});
         make_mesh();

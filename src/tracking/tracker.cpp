@@ -25,6 +25,7 @@
 #include "parallel_for_each.h"
 #include "sampling/creases.h"
 #include "surface/float_precision.h"
+#include "thread_count.h"
 #include "tracking/carry.h"
 #include "tracking/failing.h"
 #include "tracking/fitted.h"
@@ -117,22 +118,22 @@ bool Tracker::Impl::astray() const {
 }
 
 void Tracker::Impl::tetrahedralise(bool moved, std::map<std::string, double>& seconds,
-                                   const std::function<void()>& meanwhile) {
+                                   const std::function<void()>& meanwhile, int busy) {
     round_to_float(particles);
     tbb::task_group beside;
     if (meanwhile) beside.run(meanwhile);
     {
         const StageTimer timer(seconds, "delaunay");
         if (moved) labels.clear();
-        bring_dt(moved);
+        bring_dt(moved, std::max(1, thread_count() - busy));
     }
     const StageTimer timer(seconds, "certify");
     beside.wait();
 }
 
-void Tracker::Impl::bring_dt(bool moved) {
+void Tracker::Impl::bring_dt(bool moved, int threads) {
     if (in_dt.empty()) {
-        dt->assign(particles.position);
+        dt->assign(particles.position, threads);
     } else {
         // Those that are left are in their old order, the newborn behind them.
         std::size_t next = 0;

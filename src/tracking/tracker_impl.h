@@ -51,10 +51,11 @@ struct Tracker::Impl {
     bool astray() const;
 
     /// Brings the DT to the particles. `moved`: what was known of its cells does not hold any more.
-    /// `meanwhile` runs beside it, which keeps little more than one thread busy, and may read the particles.
+    /// `meanwhile` runs beside it and may read the particles; `busy` threads are left to it where the DT is
+    /// made of all particles.
     void tetrahedralise(bool moved, std::map<std::string, double>& seconds,
-                        const std::function<void()>& meanwhile = {});
-    void bring_dt(bool moved);
+                        const std::function<void()>& meanwhile = {}, int busy = 0);
+    void bring_dt(bool moved, int threads);
     /// Frees the DT; the next is built anew.
     void forget_dt();
     /// Whether so many particles moved or came in this frame that the next DT is likely to be.

@@ -259,19 +259,21 @@ TEST(Tracker, KeepsMostIdsWhenTheMotionIsSlow) {
 
 TEST(Tracker, AddsAFewToThoseBeforeWithoutTetrahedralisingAgain) {
     // A ball that is stretched to a sheet: most frames want a few per cent more.
-    SampleSequence sequence("enright");
-    Tracker tracker(with_tolerance(0.003));
     int with_some = 0, with_many = 0;
-    for (int f = 0; f < 8; ++f) {
-        const TrackedFrame frame = tracker.advance(LevelSet(sequence.next().surface));
-        if (frame.seeded > 0) continue;  // sampled anew where much is
-        // All but a few of them come when the mesh is held against the surface.
-        const double born = static_cast<double>(frame.born) / static_cast<double>(frame.particles);
-        if (born < 0.06) {
-            EXPECT_EQ(frame.rebuilt, 1u) << "frame " << f;
-            with_some += born > 0.035;
-        } else {
-            with_many += frame.rebuilt > 1;
+    for (const double tolerance : {0.0035, 0.004, 0.005}) {
+        SampleSequence sequence("enright");
+        Tracker tracker(with_tolerance(tolerance));
+        for (int f = 0; f < 7; ++f) {
+            const TrackedFrame frame = tracker.advance(LevelSet(sequence.next().surface));
+            if (frame.seeded > 0) continue;  // sampled anew where much is
+            // All but a few of them come when the mesh is held against the surface.
+            const double born = static_cast<double>(frame.born) / static_cast<double>(frame.particles);
+            if (born < 0.06) {
+                EXPECT_EQ(frame.rebuilt, 1u) << "tolerance " << tolerance << ", frame " << f;
+                with_some += born > 0.035;
+            } else {
+                with_many += frame.rebuilt > 1;
+            }
         }
     }
     EXPECT_GT(with_some, 0);

@@ -72,8 +72,9 @@ class Tetrahedralisation {
 public:
     virtual ~Tetrahedralisation() = default;
 
-    /// Starts anew with vertex i at points[i].
-    virtual void assign(const std::vector<Vec3>& points) = 0;
+    /// Starts anew with vertex i at points[i]. `threads`: so many add vertices at most, 0 for all that there
+    /// are; the cells and their order are the same.
+    virtual void assign(const std::vector<Vec3>& points, int threads = 0) = 0;
     /// Without vertices and cells, and frees their memory; the profile goes on. `assign` comes next.
     virtual void clear() = 0;
     /// Adds a vertex and returns its number: the count of vertices ever added. `near` is a vertex close by,
