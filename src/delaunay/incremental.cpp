@@ -201,7 +201,7 @@ bool IncrementalDelaunay::add_simultaneously(const std::vector<int>& order, int 
 
 void IncrementalDelaunay::build(std::vector<int>& chosen, int threads) {
     constexpr std::size_t kPerThread = 1000;  // vertices, at least
-    if (threads == 0) threads = thread_count();
+    if (threads <= 0) threads = thread_count();
     threads = static_cast<int>(std::min<std::size_t>(threads, chosen.size() / kPerThread));
     std::vector<int> order = chosen;
     sort_spatially(points, order);

@@ -9,7 +9,7 @@
 
 namespace isotrack {
 
-/// A DT that grows by one vertex after another (Bowyer 1981, Watson 1981): the cells whose spheres hold the
+/// A DT that grows by vertices (Bowyer 1981, Watson 1981): the cells whose spheres hold the
 /// new vertex make room for those between it and the rim of the hole. Where more than four vertices are on a
 /// sphere `in_sphere` decides, so that the DT depends on the points alone, not on their order.
 /// Not for concurrent use.

@@ -19,6 +19,7 @@ constexpr char kUnseen = 0;              ///< A cell that nobody is at.
 constexpr char kFree = -1;               ///< A slot without a cell.
 constexpr char kConflict = 1, kRim = 2;  ///< Of the first one to add vertices; the next has the next two.
 constexpr int kMostWorkers = 60;         ///< That have marks of their own.
+static_assert(kRim == kConflict + 1 && kRim + 2 * (kMostWorkers - 1) <= 127);
 }  // namespace cell_mark
 
 /// The marks where one thread alone adds vertices.
@@ -57,7 +58,6 @@ public:
         constexpr int kPatience = 1000;  // about a microsecond: some of what it takes to add a vertex
         for (int turn = 0; turn < kPatience; ++turn) {
             char mark = of(cell);
-            if (mark == cell_mark::kFree) return false;
             if (mark == cell_mark::kUnseen &&
                 __atomic_compare_exchange_n(marks_ + cell, &mark, conflict, false, __ATOMIC_ACQUIRE,
                                             __ATOMIC_RELAXED))
@@ -150,8 +150,7 @@ public:
         const auto cross = [&](int from, int k) {
             const int link = links[from][k], other = link >> 2;
             char mark = marks.of(other);
-            if (mark == cell_mark::kUnseen ||
-                (Marks::kShared && mark != marks.conflict && mark != marks.rim)) {
+            if (Marks::kShared ? !is_own(mark, marks) : mark == cell_mark::kUnseen) {
                 if (!marks.seize(other)) {
                     blocked = true;
                     return;
@@ -220,14 +219,15 @@ public:
     }
 
     /// Is p inside the cell's sphere, or beyond the facet of an infinite cell?
-    bool in_conflict(int cell, const Vec3& p) const {
+    bool in_conflict(int cell, const Vec3& p) {
         bool blocked = false;
-        return in_conflict(cell, p, LoneMarks(nullptr), blocked);
+        return in_conflict(cell, p, marks_, blocked);
     }
 
 private:
-    template <typename OfThese>
-    bool in_conflict(int cell, const Vec3& p, OfThese marks, bool& blocked) const {
+    static bool is_own(char mark, const Marks& marks) { return mark == marks.conflict || mark == marks.rim; }
+
+    bool in_conflict(int cell, const Vec3& p, Marks& marks, bool& blocked) const {
         const auto& v = cells_.vertices[cell];
         if (!infinite(v))
             return filtered_in_sphere(points_[v[0]], points_[v[1]], points_[v[2]], points_[v[3]], p);
@@ -240,19 +240,14 @@ private:
         // In the plane of the facet the circle decides, in which that plane cuts the sphere of the cell
         // behind it.
         const int behind = cells_.neighbour(cell, k);
-        if constexpr (OfThese::kShared) {
-            const char mark = marks.of(behind);
-            if (mark != marks.conflict && mark != marks.rim) {
-                if (!marks.seize(behind)) {
-                    blocked = true;
-                    return false;
-                }
-                const bool result = in_conflict(behind, p, marks, blocked);
-                marks.release(behind);
-                return result;
-            }
+        const bool seizes = Marks::kShared && !is_own(marks.of(behind), marks);
+        if (seizes && !marks.seize(behind)) {
+            blocked = true;
+            return false;
         }
-        return in_conflict(behind, p, marks, blocked);
+        const bool result = in_conflict(behind, p, marks, blocked);
+        if (seizes) marks.release(behind);
+        return result;
     }
 
     /// Makes the cells of `fresh`, one on every facet of the rim. `edge(a, b)` is a place for the link across
@@ -305,7 +300,7 @@ private:
             for (int j = 0; j < 3; ++j) own[f[(j + 2) % 3]] = edge(c[(j + 1) % 3], c[j]);
         }
         for (const int w : room_.corners) corner_of[w] = kNone;
-        if (Marks::kShared) {
+        if (Marks::kShared) {  // not before: others look for a cell by the number of its slot
             for (std::size_t i = 0; i < rim.size(); ++i) marks.release(fresh[i]);
             for (const auto& facet : rim) release_rim(facet.cell);
         }

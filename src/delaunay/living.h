@@ -50,7 +50,7 @@ public:
     const UpdateProfile& profile() const { return profile_; }  ///< Since the first `assign`.
 
 private:
-    void rebuild(int threads = 1);
+    void rebuild(int threads = 1);  // one where few vertices are left, or the first ones come
     const std::vector<int>& star_of(int number) const;
     void place(int number, int cell);
     void note(const std::vector<int>& slots);

@@ -72,14 +72,14 @@ bool SimultaneousInsertion::add(const int* begin, const int* end) {
 }
 
 /// A seized cell that has the place of p in it.
-int SimultaneousInsertion::locate(Insertion<SharedMarks>& insertion, const SharedMarks& marks, const Vec3& p,
+int SimultaneousInsertion::locate(SharedInsertion& insertion, const SharedMarks& marks, const Vec3& p,
                                   Worker& worker) const {
     const int used = used_;
-    for (int slot = 0; slot < used; ++slot) {
+    for (int looked_at = 0; looked_at < used; ++looked_at) {
         if (marks.of(worker.near) == cell_mark::kUnseen) return insertion.locate(p, worker.near);
         if (++worker.near == used) worker.near = 0;
     }
-    return Insertion<SharedMarks>::kBlocked;
+    return SharedInsertion::kBlocked;
 }
 
 /// So many as the rim has facets. False where there are no more.
@@ -113,10 +113,10 @@ bool SimultaneousInsertion::take_slots(Worker& worker) {
 bool SimultaneousInsertion::add(int vertex, int number, Worker& worker) {
     const Vec3& p = points_[vertex];
     SharedMarks marks(marks_.data(), number);
-    Insertion<SharedMarks> insertion(points_, cells_, marks, worker.room);
+    SharedInsertion insertion(points_, cells_, marks, worker.room);
     for (int attempt = 0; attempt < kAttempts && !worker.full; ++attempt) {
         const int cell = locate(insertion, marks, p, worker);
-        if (cell == Insertion<SharedMarks>::kBlocked) continue;
+        if (cell == SharedInsertion::kBlocked) continue;
         if (insertion.vertex_at(p, cell) >= 0) {
             marks.release(cell);
             worker.twice = true;

@@ -11,7 +11,8 @@ namespace isotrack {
 
 /// Adds vertices to a DT by several threads: each seizes the cells that it reads, and gives them up where
 /// another is at one of them. Which slots cells get depends on the hour, the DT itself on the points alone.
-/// Until `finish` the arrays are of no use to others. Takes 4 bytes a point and thread meanwhile.
+/// Until `finish`, and without it, the arrays are of no use to others. Takes 4 bytes a point and thread
+/// meanwhile.
 class SimultaneousInsertion {
 public:
     /// Of the points, cells and marks of a DT, and of its slots that are free. `most`: cells that it may come
@@ -21,15 +22,16 @@ public:
     /// Slots that may be left unused.
     static std::size_t slack(int threads);
 
-    /// Adds those from `begin` to `end`. Neighbours in this order should be so in space. False where one of
-    /// these or of those before is on the place of another: it is left out, and who was first depends on the
-    /// hour.
+    /// Adds those from `begin` to `end`. Neighbours in this order should be so in space. False where one was
+    /// found on the place of another: it is left out, and who was first depends on the hour. One of those
+    /// that `finish` returns may be so, too.
     bool add(const int* begin, const int* end);
     /// Gives back the slots that are not used. Returns those that could not be added: others were in the way,
     /// or there was no room.
     std::vector<int> finish();
 
 private:
+    using SharedInsertion = Insertion<SharedMarks>;
     struct Worker {
         InsertionRoom room;
         std::vector<int> free;        // slots that its cells went from
@@ -41,8 +43,7 @@ private:
 
     bool add(int vertex, int number, Worker& worker);
     bool take_slots(Worker& worker);
-    int locate(Insertion<SharedMarks>& insertion, const SharedMarks& marks, const Vec3& p,
-               Worker& worker) const;
+    int locate(SharedInsertion& insertion, const SharedMarks& marks, const Vec3& p, Worker& worker) const;
 
     const std::vector<Vec3>& points_;
     Tetrahedra& cells_;

@@ -51,8 +51,8 @@ struct Tracker::Impl {
     bool astray() const;
 
     /// Brings the DT to the particles. `moved`: what was known of its cells does not hold any more.
-    /// `meanwhile` runs beside it and may read the particles; `busy` threads are left to it where the DT is
-    /// made of all particles.
+    /// `meanwhile` runs beside it and may read the particles; `busy` threads are left to it where there was
+    /// no DT before.
     void tetrahedralise(bool moved, std::map<std::string, double>& seconds,
                         const std::function<void()>& meanwhile = {}, int busy = 0);
     void bring_dt(bool moved, int threads);

@@ -53,8 +53,8 @@ std::vector<Vec3> bumps(int n) {
     return points;
 }
 
-/// More points than one thread builds the DT of alone: in general position, on common spheres and planes,
-/// with cells that span all of them, and some that see half of the hull.
+/// Points of which some threads build a DT, but for the fewest: in general position, on common spheres and
+/// planes, with cells that span all of them, and some that see half of the hull.
 Clouds clouds() {
     Clouds result;
     const auto inside = ball(12000);
@@ -97,17 +97,18 @@ TEST(SimultaneousInsertion, GivesTheCellsOfOneThreadInTheSameOrder) {
     }
 }
 
-TEST(SimultaneousInsertion, TakesSixtyThreadsAtMost) {
-    const auto points = bumps(64000);
-    expect_same(built_by(1, points), built_by(64, points), "bumps");
+TEST(SimultaneousInsertion, WorksWithMoreThreadsThanThereAreMarks) {
+    const auto points = bumps(130000);
+    expect_same(built_by(1, points), built_by(130, points), "bumps");
 }
 
 TEST(SimultaneousInsertion, LeavesOutTheSamePointOfTwoOnOnePlace) {
-    std::vector<Vec3> points = ball(6000);
-    for (int i = 0; i < 6000; i += 20) points.push_back(points[i]);
-    const Tetrahedra alone = built_by(1, points);
-    EXPECT_EQ(alone.size(), built_by(1, ball(6000)).size());
-    for (int again = 0; again < 4; ++again) expect_same(alone, built_by(4, points), "doubled");
+    // One pair at a time, wherever it is met: before there are several threads, by them, or after.
+    for (int i = 0; i < 6000; i += 500) {
+        std::vector<Vec3> points = ball(6000);
+        points.push_back(points[i]);
+        expect_same(built_by(1, points), built_by(4, points), "doubled " + std::to_string(i));
+    }
 }
 
 TEST(SimultaneousInsertion, MakesMoreCellsThanThereIsRoomFor) {
@@ -159,7 +160,10 @@ TEST(SimultaneousInsertion, SaysWherePointsAreDoubled) {
     points[3000] = points[2000];
     Begun begun(points, 1500);
     SimultaneousInsertion insertion(begun.points, begun.cells, begun.marks, begun.free, 8 * 4000, 4);
-    EXPECT_FALSE(insertion.add(begun.others.data(), begun.others.data() + begun.others.size()));
+    const bool none = insertion.add(begun.others.data(), begun.others.data() + begun.others.size());
+    const std::vector<int> left = insertion.finish();
+    const auto is_left = [&](int v) { return std::find(left.begin(), left.end(), v) != left.end(); };
+    EXPECT_EQ(none, is_left(2000) || is_left(3000));
 }
 
 TEST(SimultaneousInsertion, LeavesAllWhereThereIsNoRoom) {

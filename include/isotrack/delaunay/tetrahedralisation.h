@@ -87,7 +87,7 @@ public:
     /// strategies that only note changes as of the last `settle`.
     virtual void neighbours(int vertex, std::vector<int>& result) const = 0;
 
-    /// Makes the DT that of the points where they are now.
+    /// Makes the DT that of the points where they are now; by all threads where it is built anew for that.
     virtual void settle() = 0;
 
     /// Settles, then numbers the vertices that are left anew: in their order, from 0. The cells keep their
