@@ -122,6 +122,9 @@ public:
         }
     }
 
+    /// Whether it is a cell that nobody is at.
+    bool is_unseen(int cell) const { return marks_.of(cell) == cell_mark::kUnseen; }
+
     /// The vertex of `cell` at p, or -1.
     int vertex_at(const Vec3& p, int cell) const {
         for (const int v : cells_.vertices[cell])
@@ -148,6 +151,7 @@ public:
         int* hole = freed.data();  // links: into the cells in conflict, each from the one it was found from
         InsertionRoom::Facet* around = rim.data();
         const auto cross = [&](int from, int k) {
+            if (Marks::kShared && blocked) return;  // nothing more is of use
             const int link = links[from][k], other = link >> 2;
             char mark = marks.of(other);
             if (Marks::kShared ? !is_own(mark, marks) : mark == cell_mark::kUnseen) {

@@ -72,11 +72,10 @@ bool SimultaneousInsertion::add(const int* begin, const int* end) {
 }
 
 /// A seized cell that has the place of p in it.
-int SimultaneousInsertion::locate(SharedInsertion& insertion, const SharedMarks& marks, const Vec3& p,
-                                  Worker& worker) const {
+int SimultaneousInsertion::locate(SharedInsertion& insertion, const Vec3& p, Worker& worker) const {
     const int used = used_;
     for (int looked_at = 0; looked_at < used; ++looked_at) {
-        if (marks.of(worker.near) == cell_mark::kUnseen) return insertion.locate(p, worker.near);
+        if (insertion.is_unseen(worker.near)) return insertion.locate(p, worker.near);
         if (++worker.near == used) worker.near = 0;
     }
     return SharedInsertion::kBlocked;
@@ -115,7 +114,7 @@ bool SimultaneousInsertion::add(int vertex, int number, Worker& worker) {
     SharedMarks marks(marks_.data(), number);
     SharedInsertion insertion(points_, cells_, marks, worker.room);
     for (int attempt = 0; attempt < kAttempts && !worker.full; ++attempt) {
-        const int cell = locate(insertion, marks, p, worker);
+        const int cell = locate(insertion, p, worker);
         if (cell == SharedInsertion::kBlocked) continue;
         if (insertion.vertex_at(p, cell) >= 0) {
             marks.release(cell);

@@ -43,7 +43,7 @@ private:
 
     bool add(int vertex, int number, Worker& worker);
     bool take_slots(Worker& worker);
-    int locate(SharedInsertion& insertion, const SharedMarks& marks, const Vec3& p, Worker& worker) const;
+    int locate(SharedInsertion& insertion, const Vec3& p, Worker& worker) const;
 
     const std::vector<Vec3>& points_;
     Tetrahedra& cells_;

@@ -15,6 +15,7 @@
 
 #include "isotrack/delaunay/predicates.h"
 #include "isotrack/delaunay/tetrahedralisation.h"
+#include "support/gaussian_points.h"
 
 namespace isotrack {
 namespace {
@@ -53,18 +54,10 @@ Cells sorted_cells(const Tetrahedra& cells) {
     return result;
 }
 
-std::vector<Vec3> gaussian_points(int n, unsigned seed) {
-    std::mt19937 random(seed);
-    std::normal_distribution<double> u;
-    std::vector<Vec3> points;
-    for (int i = 0; i < n; ++i) points.emplace_back(u(random), u(random), u(random));
-    return points;
-}
-
 /// Points in general position and in all the positions that are not.
 std::vector<std::pair<std::string, std::vector<Vec3>>> clouds() {
     std::vector<std::pair<std::string, std::vector<Vec3>>> result;
-    const auto ball = gaussian_points(2000, 1);
+    const auto ball = support::gaussian_points(2000, 1);
     result.emplace_back("ball", ball);
     auto points = ball;
     for (Vec3& p : points) p.normalize();

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "delaunay/incremental.h"
 #include "delaunay/spatial_order.h"
 #include "numbers_below.h"
+#include "support/gaussian_points.h"
 
 namespace isotrack {
 namespace {
@@ -40,11 +40,7 @@ Tetrahedra built_by(int threads, const std::vector<Vec3>& points) {
 }
 
 std::vector<Vec3> ball(int n) {
-    std::mt19937 random(1);
-    std::normal_distribution<double> u;
-    std::vector<Vec3> points;
-    for (int i = 0; i < n; ++i) points.emplace_back(u(random), u(random), u(random));
-    return points;
+    return support::gaussian_points(n, 1);
 }
 
 std::vector<Vec3> bumps(int n) {
