@@ -1,6 +1,8 @@
 #include "isotrack/memory.h"
 
+#include <algorithm>
 #include <cstdlib>
+#include <thread>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -9,6 +11,9 @@ namespace isotrack {
 
 void keep_little_memory() {
 #ifdef __GLIBC__
+    // What a thread freed is of no use to those of other arenas. With one for two threads they seldom wait
+    // for each other.
+    mallopt(M_ARENA_MAX, std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / 2));
     // What is used anew in each stage had better not come from the system each time, page by page: blocks up
     // to the largest that may be kept are. Fixed, else both thresholds go with the blocks that are freed.
     mallopt(M_MMAP_THRESHOLD, 1 << 25);

@@ -14,23 +14,25 @@ Triangle renamed(const Triangle& t, const std::vector<int>& of_vertex) {
     return {of_vertex[t[0]], of_vertex[t[1]], of_vertex[t[2]]};
 }
 
-using Edges = std::vector<std::pair<int, int>>;  // each from the lower end, ascending
+using Edge = std::pair<int, int>;  // from the lower end
 
-void add_edges(const Triangle& t, Edges& edges) {
-    for (int k = 0; k < 3; ++k) edges.push_back(std::minmax(t[k], t[(k + 1) % 3]));
+std::array<Edge, 3> edges_of(const Triangle& t) {
+    return {std::minmax(t[0], t[1]), std::minmax(t[1], t[2]), std::minmax(t[2], t[0])};
 }
-bool has(const Edges& edges, const std::pair<int, int>& edge) {
-    return std::binary_search(edges.begin(), edges.end(), edge);
+bool has_edge(const Triangle& t, const Edge& edge) {
+    const auto edges = edges_of(t);
+    return std::find(edges.begin(), edges.end(), edge) != edges.end();
 }
 
-/// Of the triangles that stand for none of the last mesh.
-Edges edges_of_new(const std::vector<Triangle>& triangles, const std::vector<int>& now) {
+/// Of the triangles that stand for none of the last mesh, ascending.
+std::vector<Edge> edges_of_new(const std::vector<Triangle>& triangles, const std::vector<int>& now) {
     std::vector<char> is_new(triangles.size(), 1);
     for (const int t : now)
         if (t >= 0) is_new[t] = 0;
-    Edges result;
+    std::vector<Edge> result;
     for (std::size_t t = 0; t < triangles.size(); ++t)
-        if (is_new[t]) add_edges(triangles[t], result);
+        if (is_new[t])
+            for (const Edge& edge : edges_of(triangles[t])) result.push_back(edge);
     std::sort(result.begin(), result.end());
     return result;
 }
@@ -53,22 +55,22 @@ KeptFlips::KeptFlips(const std::vector<std::array<int, 2>>& flips, const std::ve
 void KeptFlips::put_into(CarvedSurface& carved, const std::vector<int>& now, const std::vector<int>& vertex,
                          std::vector<char>& around) {
     if (flips_.empty()) return;
-    const Edges of_new = edges_of_new(carved.triangles, now);
+    const std::vector<Edge> of_new = edges_of_new(carved.triangles, now);
     const auto is_there = [&](const Kept& flip) {
         for (int i = 0; i < 2; ++i)
             if (now[flip.triangle[i]] < 0 ||
                 std::any_of(flip.after[i].begin(), flip.after[i].end(), [&](int p) { return vertex[p] < 0; }))
                 return false;
-        Edges before, after;
-        for (int i = 0; i < 2; ++i) {
-            add_edges(renamed(flip.before[i], vertex), before);
-            add_edges(renamed(flip.after[i], vertex), after);
-        }
-        std::sort(before.begin(), before.end());
-        return std::none_of(after.begin(), after.end(),
-                            [&](const auto& edge) { return !has(before, edge) && has(of_new, edge); });
+        const Triangle before[2] = {renamed(flip.before[0], vertex), renamed(flip.before[1], vertex)};
+        for (const Triangle& after : flip.after)
+            for (const Edge& edge : edges_of(renamed(after, vertex)))
+                if (!has_edge(before[0], edge) && !has_edge(before[1], edge) &&
+                    std::binary_search(of_new.begin(), of_new.end(), edge))
+                    return false;
+        return true;
     };
     std::vector<char> keep;
+    keep.reserve(flips_.size());
     for (Kept& flip : flips_) {
         keep.push_back(is_there(flip));
         for (int i = 0; i < 2; ++i) {

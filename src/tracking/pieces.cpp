@@ -25,7 +25,9 @@ std::vector<Piece> make_pieces(const Adjacency& ring, const std::vector<Vec3>& a
     for (std::size_t first = 0; first < n; ++first) {
         if (piece_of[first] >= 0) continue;
         const int number = static_cast<int>(pieces.size());
-        std::vector<int> some{static_cast<int>(first)};
+        std::vector<int> some;
+        some.reserve(size);
+        some.push_back(static_cast<int>(first));
         piece_of[first] = number;
         int neighbour = -1;
         for (std::size_t next = 0; next < some.size(); ++next)
@@ -43,17 +45,19 @@ std::vector<Piece> make_pieces(const Adjacency& ring, const std::vector<Vec3>& a
             pieces.emplace_back().particles = std::move(some);
         }
     }
+    std::vector<int> beside;
     for (std::size_t k = 0; k < pieces.size(); ++k) {
         Piece& piece = pieces[k];
+        beside.clear();
         for (const int i : piece.particles) {
             piece.middle += at[i] / static_cast<double>(piece.particles.size());
             for (const int j : ring.of(i))
-                if (piece_of[j] != static_cast<int>(k)) piece.beside.push_back(piece_of[j]);
+                if (piece_of[j] != static_cast<int>(k)) beside.push_back(piece_of[j]);
         }
         for (const int i : piece.particles)
             piece.size2 += (at[i] - piece.middle).squaredNorm() / static_cast<double>(piece.particles.size());
-        std::sort(piece.beside.begin(), piece.beside.end());
-        piece.beside.erase(std::unique(piece.beside.begin(), piece.beside.end()), piece.beside.end());
+        std::sort(beside.begin(), beside.end());
+        piece.beside.assign(beside.begin(), std::unique(beside.begin(), beside.end()));
     }
     return pieces;
 }

@@ -46,8 +46,10 @@ std::vector<Triangle> triangles_within(std::vector<int> ring, const Vec3& middle
     if (!(normal.squaredNorm() > 0.0)) return {};
     const Vec3 n = normal.normalized(), x = n.unitOrthogonal(), y = n.cross(x);
     std::vector<Vec2> at;
+    at.reserve(ring.size());
     for (const int v : ring) at.emplace_back((points[v] - middle).dot(x), (points[v] - middle).dot(y));
     std::vector<Triangle> result;
+    result.reserve(ring.size() - 2);
     while (ring.size() >= 3) {
         const std::size_t size = ring.size();
         const auto is_ear = [&](std::size_t k) {  // whose circle is empty
@@ -69,6 +71,8 @@ std::vector<Triangle> triangles_within(std::vector<int> ring, const Vec3& middle
 }
 
 class Thinning {
+    static constexpr std::size_t kMostlyEnough = 8;  // triangles around a particle
+
 public:
     Thinning(const Particles& particles, std::vector<Triangle>& triangles, const Surface& surface,
              const CrossingGrid& crossings, const ThinningLimits& limits)
@@ -143,7 +147,6 @@ private:
     /// A list of them, which may be changed from now on.
     std::vector<int>& fan_of(int i) {
         if (!changed_[i]) {
-            constexpr std::size_t kMostlyEnough = 8;
             fan_[i].reserve(kMostlyEnough);
             for_each_around(i, [&](int t) { fan_[i].push_back(t); });
         }
@@ -166,14 +169,15 @@ private:
 
     /// The vertices around one, in order, counter-clockwise; empty where its triangles are not one fan.
     std::vector<int> ring_around(int i) const {
-        std::vector<int> fan;
+        std::vector<int> fan, ring;
+        fan.reserve(kMostlyEnough);
         for_each_around(i, [&](int t) { fan.push_back(t); });
+        ring.reserve(fan.size());
         const auto after = [&](int t, int steps) {
             const Triangle& corner = triangles_[t];
             const auto k = std::find(corner.begin(), corner.end(), i) - corner.begin();
             return corner[(k + steps) % 3];
         };
-        std::vector<int> ring;
         if (fan.empty()) return ring;
         int next = after(fan[0], 1);
         do {
@@ -222,6 +226,8 @@ private:
         std::vector<FacingTriangle> before, after;
         Box box(at[i]);
         for (const int v : ring) box.extend(at[v]);
+        before.reserve(ring.size());
+        after.reserve(closing.size());
         for_each_around(i, [&](int t) { before.push_back(facing_triangle(triangles_[t])); });
         for (const Triangle& t : closing) after.push_back(facing_triangle(t));
         if (!stand_for_same(crossings_, before, box, after, {}, limits_.reach)) closing.clear();
