@@ -375,8 +375,10 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     const SizingLimits& l = work.limits;
     TrackedFrame& frame = work.frame;
     const double apart = options.method == Method::Paper ? kDenseSeeds : kSparseSeeds;
+    tbb::task_group beside;  // as a registration is in part the work of one thread
+    beside.run([&] { work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface)); });
     const auto crossings = [&]() -> const CrossingGrid& {
-        if (!work.crossings) work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface));
+        beside.wait();
         return *work.crossings;
     };
     {

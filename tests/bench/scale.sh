@@ -96,7 +96,7 @@ fi
 
 echo "Resolution, at the same tolerance in world units, half a voxel of 256 per diagonal; seconds. Reading a file, which volumeToMesh would have to do as well, is not in the total."
 echo
-echo "| voxels per diagonal | active voxels | particles | read | open | cover | other stages | total | volumeToMesh, adaptivity 0.1 | 0 | total over 0.1 | over 0 | cover, ns per active voxel |"
+echo "| voxels per diagonal | active voxels | particles | read | open | cover | other stages | total | volumeToMesh, adaptivity 0.1 | 0 | total over 0.1 | over 0 | carry and cover, ns per active voxel |"
 echo "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
 write --per-diagonal 256 --frames 1
 tolerance=$(calculate "0.5 * $voxel")
@@ -107,12 +107,12 @@ for size in "$@"; do
     evaluate -v size="$size" -v least="$least" -v least_file="$work/least" '
         END {
             total = value["open"] + value["advance"]; others = value["advance"] - value["cover"]
-            nanoseconds = 1e9 * value["cover"] / value["voxels"]
+            nanoseconds = 1e9 * (value["carry"] + value["cover"]) / value["voxels"]
             printf "| %d | %d | %d | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | %.2f | %.0f |\n", size, value["voxels"],
                    value["particles"], value["read"], value["open"], value["cover"], others, total, value["adaptive"], value["uniform"],
                    total / value["adaptive"], total / value["uniform"], nanoseconds
             miss(value["not_kept"] > 0, size ": tolerance not kept")
-            miss(nanoseconds > 30, sprintf("%d: cover %.0f ns per active voxel", size, nanoseconds))
+            miss(nanoseconds > 30, sprintf("%d: carry and cover %.0f ns per active voxel", size, nanoseconds))
             if (least == "") print others >least_file
             else miss(others > 1.1 * least, sprintf("%d: other stages take %.1f times what they take at the first size", size, others / least))
             miss(size == 1024 && total > value["adaptive"], sprintf("%d: %.2f of volumeToMesh at adaptivity 0.1", size, total / value["adaptive"]))
@@ -120,7 +120,7 @@ for size in "$@"; do
         }'
 done
 echo
-echo "Wanted: cover at most 30 ns per active voxel; the time of the other stages does not grow (by no more than a tenth); the total below volumeToMesh's at adaptivity 0.1 from 1024 on, at adaptivity 0 from 2048 on."
+echo "What is covered is found beside the carry and counted there in part. Wanted: both together at most 30 ns per active voxel; the time of the stages other than cover does not grow (by no more than a tenth); the total below volumeToMesh's at adaptivity 0.1 from 1024 on, at adaptivity 0 from 2048 on."
 print_missed
 
 echo
@@ -134,16 +134,19 @@ evaluate '
         if (!(key in second) || !(value[key] > 0)) return
         times = second[key] / value[key]
         printf "| %s | %.3f | %.3f | %.2f |\n", text, second[key], value[key], times
-        miss((key == "relax" || key == "certify" || key == "cover") && times < 1.6, sprintf("%s %.2f", text, times))
+        miss((key == "relax" || key == "certify" || key == "both") && times < 1.6, sprintf("%s %.2f", text, times))
     }
     END {
         printf "Threads, on %d particles; seconds.\n\n| stage | 1 thread | 2 threads | speed-up |\n|---|---:|---:|---:|\n", value["particles"]
-        count = split("open carry cover size relax delaunay convect fit certify blunt", stages, " ")
+        value["both"] = value["carry"] + value["cover"]; second["both"] = second["carry"] + second["cover"]
+        row("open", "open")
+        row("carry and cover", "both")
+        count = split("size relax delaunay convect fit certify blunt", stages, " ")
         for (i = 1; i <= count; i++) row(stages[i], stages[i])
         row("all but open", "advance")
     }'
 echo
-echo "Wanted: a speed-up of 1.6 in relax, certify and cover."
+echo "Wanted: a speed-up of 1.6 in relax, certify, and carry and cover, which run beside each other."
 print_missed
 
 echo

@@ -98,8 +98,9 @@ struct TrackedFrame {
     /// following every detail would take more particles than half the lattice crossings (at half a voxel;
     /// more at less).
     bool within_tolerance = true;
-    std::map<std::string, double>
-        seconds;  ///< Per stage: carry, cover, size, relax, delaunay, convect, fit, certify, blunt.
+    /// Per stage: carry, cover, size, relax, delaunay, convect, fit, certify, blunt. What is covered is found
+    /// beside the carry: cover is the time that it takes longer.
+    std::map<std::string, double> seconds;
 };
 
 /// Follows one surface. Not for concurrent use: frames depend on each other. Uses TBB inside.
