@@ -42,17 +42,24 @@ struct Slope {
 };
 
 Slope slope_at_surface(const FloatTree& tree, const AffineMap& map, const CrossedEdges& crossings) {
-    constexpr std::size_t kSamples = 4000;
-    Stencil stencil(tree);
-    std::vector<double> slopes;
+    constexpr std::size_t kSamples = 4000, kBlock = 256;
     const std::size_t step = 1 + crossings.size() / kSamples;
-    for (int pass = 0; pass < 2 && slopes.empty(); ++pass)  // the border only when there is nothing else
-        for (std::size_t i = 0; i < crossings.size(); i += step) {
-            const CrossedEdge edge = crossings[i];
-            if (pass == 0 && edge.at_border) continue;
-            const double slope = map.gradient_to_world(stencil.sample(edge.index()).gradient).norm();
-            if (std::isfinite(slope) && slope > 0.0) slopes.push_back(slope);
-        }
+    const auto slopes_of = [&](bool at_border) {
+        return find_in_blocks<double>(
+            (crossings.size() + step - 1) / step, kBlock,
+            [&](std::size_t begin, std::size_t end, std::vector<double>& found) {
+                Stencil stencil(tree);
+                for (std::size_t n = begin; n < end; ++n) {
+                    const CrossedEdge edge = crossings[n * step];
+                    if (edge.at_border && !at_border) continue;
+                    const double slope =
+                        map.gradient_to_world(stencil.sample(edge.index()).gradient).norm();
+                    if (std::isfinite(slope) && slope > 0.0) found.push_back(slope);
+                }
+            });
+    };
+    std::vector<double> slopes = slopes_of(false);
+    if (slopes.empty()) slopes = slopes_of(true);  // the border only when there is nothing else
     if (slopes.empty()) return {};
     constexpr double kSteepest = 10.0;  // medians: next to a value that was not finite it may be anything
     std::vector<double> ranked = slopes;
