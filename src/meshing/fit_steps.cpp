@@ -123,7 +123,7 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
     std::vector<Vec3> to = vertices;
     std::vector<Eigen::Vector3f> last(moving.size(), Eigen::Vector3f::Zero());  // steps
     ThreadProbes probes(surface);
-    SpoiltSteps spoilt_steps(triangles, corners, movable);
+    SpoiltSteps spoilt_steps(triangles, movable);
     Chebyshev pace;
     for (int step = 0; step < steps; ++step, pace.next()) {
         parallel_for_each(moving.size(), kVertexGrain, [&](std::size_t m) {

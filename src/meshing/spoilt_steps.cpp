@@ -22,33 +22,30 @@ bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const
 }  // namespace
 
 void SpoiltSteps::undo(const std::vector<Vec3>& vertices, std::vector<Vec3>& to) {
-    // Of `count` triangles.
-    const auto spoilt_among = [&](std::size_t count, const auto& number) {
+    const auto spoilt_among = [&](const auto& is_looked_at) {
         constexpr std::size_t kTrianglesPerBlock = 1024;
         return find_in_blocks<int>(
-            count, kTrianglesPerBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
-                for (std::size_t n = begin; n < end; ++n) {
-                    const auto t = number(n);
+            triangles_.size(), kTrianglesPerBlock,
+            [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
+                for (std::size_t t = begin; t < end; ++t) {
                     const auto& [i, j, k] = triangles_[t];
-                    if (spoilt(vertices[i], vertices[j], vertices[k], to[i], to[j], to[k]))
+                    if (is_looked_at(triangles_[t]) &&
+                        spoilt(vertices[i], vertices[j], vertices[k], to[i], to[j], to[k]))
                         found.push_back(static_cast<int>(t));
                 }
             });
     };
-    // In all triangles, then in those around what was undone.
-    std::vector<int> bad = spoilt_among(triangles_.size(), [](std::size_t n) { return n; });
+    // All triangles, then those around what was undone: to look for them in all costs less than to list them.
+    std::vector<int> bad = spoilt_among([](const Triangle&) { return true; });
     for (int pass = 0; !bad.empty(); ++pass) {
         for (const int t : bad)
             for (const int v : triangles_[t])
                 if (movable_[v]) back_.add(v);
-        for (const int v : back_.list()) {
+        for (const int v : back_.list())
             to[v] = pass < kHalvings ? Vec3(0.5 * (vertices[v] + to[v])) : vertices[v];
-            for (int e = corners_.first[v]; e < corners_.first[v + 1]; ++e)
-                around_.add(corners_.corner[e] / 3);
-        }
-        bad = spoilt_among(around_.list().size(), [&](std::size_t n) { return around_.list()[n]; });
+        bad = spoilt_among(
+            [&](const Triangle& t) { return back_.has(t[0]) || back_.has(t[1]) || back_.has(t[2]); });
         back_.clear();
-        around_.clear();
     }
 }
 

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "isotrack/types.h"
-#include "meshing/corners.h"
 
 namespace isotrack {
 
@@ -13,15 +12,10 @@ namespace isotrack {
 /// mesh, with memory of its own from step to step.
 class SpoiltSteps {
 public:
-    /// All must outlive it. `movable`: a flag per vertex, the others make no steps. `corners` must have all
-    /// triangles around a movable vertex.
-    SpoiltSteps(const std::vector<Triangle>& triangles, const Corners& corners,
-                const std::vector<char>& movable)
-        : triangles_(triangles),
-          corners_(corners),
-          movable_(movable),
-          back_(movable.size()),
-          around_(triangles.size()) {}
+    /// Both must outlive it. `triangles` must have all around a movable vertex. `movable`: a flag per vertex,
+    /// the others make no steps.
+    SpoiltSteps(const std::vector<Triangle>& triangles, const std::vector<char>& movable)
+        : triangles_(triangles), movable_(movable), back_(movable.size()) {}
 
     /// Shortens the steps from `vertices` to `to` around triangles that they spoil, and takes them back where
     /// that is not enough. A step is at most a tenth of the edges around its vertex. Uses TBB inside.
@@ -37,6 +31,7 @@ private:
             has_[n] = 1;
             list_.push_back(n);
         }
+        bool has(int n) const { return has_[n] != 0; }
         const std::vector<int>& list() const { return list_; }
         void clear() {
             for (const int n : list_) has_[n] = 0;
@@ -49,9 +44,8 @@ private:
     };
 
     const std::vector<Triangle>& triangles_;
-    const Corners& corners_;
     const std::vector<char>& movable_;
-    Numbers back_, around_;
+    Numbers back_;
 };
 
 }  // namespace isotrack
