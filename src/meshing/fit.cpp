@@ -16,9 +16,12 @@ void fit(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles, co
          int steps, const std::vector<char>& movable, double damping) {
     const std::vector<char> all(movable.empty() ? vertices.size() : 0, 1);
     const std::vector<char>& moves = movable.empty() ? all : movable;
-    std::vector<Triangle> moving;
-    std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(moving),
-                 [&](const Triangle& t) { return moves[t[0]] || moves[t[1]] || moves[t[2]]; });
+    const bool all_move = std::find(moves.begin(), moves.end(), 0) == moves.end();
+    std::vector<Triangle> some;
+    if (!all_move)
+        std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(some),
+                     [&](const Triangle& t) { return moves[t[0]] || moves[t[1]] || moves[t[2]]; });
+    const std::vector<Triangle>& moving = all_move ? triangles : some;
     const Corners corners(vertices.size(), moving);
     for (; steps > 0; steps -= kStepsPerReading)
         fit_steps(vertices, moving, corners, facet_values(vertices, moving, corners, surface), surface,

@@ -13,6 +13,7 @@
 #include "meshing/facet_values.h"
 #include "meshing/fit_steps.h"
 #include "meshing/sharpness.h"
+#include "parallel_for_each.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -45,14 +46,14 @@ public:
     /// Flips what gains most first, and no triangle twice. Returns the triangles.
     std::vector<std::array<int, 2>> flip(const std::vector<char>& movable) {
         std::vector<double> error(triangles_.size(), 0.0);
-        for (std::size_t t = 0; t < triangles_.size(); ++t) {
+        constexpr std::size_t kTrianglesPerBlock = 1024;
+        parallel_for_each(triangles_.size(), kTrianglesPerBlock, [&](std::size_t t) {
             const auto& [i, j, k] = triangles_[t];
             if (movable[i] && movable[j] && movable[k]) error[t] = facets_[t].error();
-        }
+        });
         const auto count = std::count_if(error.begin(), error.end(), [](double e) { return e > 0.0; });
         const double worth = 2.0 * kWorth * std::accumulate(error.begin(), error.end(), 0.0) /
                              static_cast<double>(std::max<std::ptrdiff_t>(1, count));
-        constexpr std::size_t kTrianglesPerBlock = 1024;
         const std::vector<Flip> flips =
             find_in_blocks<Flip>(triangles_.size(), kTrianglesPerBlock,
                                  [&](std::size_t begin, std::size_t end, std::vector<Flip>& found) {
