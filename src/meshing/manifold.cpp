@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "find_in_blocks.h"
@@ -15,16 +16,21 @@ namespace {
 
 /// The boundary facets of the inside cells, as links, ascending.
 std::vector<int> boundary_facets(const Tetrahedra& cells, const CellLabels& labels) {
-    constexpr std::size_t kBlock = 8192;
-    return find_in_blocks<int>(cells.size(), kBlock,
-                               [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
-                                   for (int c = static_cast<int>(begin); c < static_cast<int>(end); ++c) {
-                                       if (!labels[c]) continue;
-                                       for (int k = 0; k < 4; ++k)
-                                           if (!labels[cells.neighbour(c, k)])
-                                               found.push_back(Tetrahedra::link(c, k));
-                                   }
-                               });
+    constexpr std::size_t kBlock = 8192, kCells = 256;
+    return find_in_blocks<int>(
+        cells.size(), kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
+            std::array<int, 4 * kCells> links;
+            for (; begin < end; begin += kCells) {
+                std::size_t count = 0;  // without a branch, which would be mispredicted
+                for (int c = static_cast<int>(begin); c < static_cast<int>(std::min(end, begin + kCells));
+                     ++c)
+                    for (int k = 0; k < 4; ++k) {
+                        links[count] = Tetrahedra::link(c, k);
+                        count += (labels[c] != 0) & (labels[cells.neighbour(c, k)] == 0);
+                    }
+                found.insert(found.end(), links.begin(), links.begin() + static_cast<std::ptrdiff_t>(count));
+            }
+        });
 }
 
 /// These facets of a surface by number, which must stay while they are asked about, and which one follows
@@ -74,28 +80,14 @@ struct HalfEdge {
     }
 };
 
-/// Whether the triangles at a vertex are a single fan: from each to the next around it they come back to the
-/// first after all, and no edge is met twice.
-bool is_fan(int v, const Corners& corners, const std::vector<Triangle>& triangles) {
-    constexpr int kNext[] = {1, 2, 0};
-    constexpr int kUsual = 16;  // triangles, at most
-    std::array<int, kUsual> usual_from, usual_to;
-    std::vector<int> many;
-    const int begin = corners.first[v], count = corners.first[v + 1] - begin;
-    if (count > kUsual) many.resize(2 * count);
-    // Of the edge opposite v in each.
-    int* const from = count > kUsual ? many.data() : usual_from.data();
-    int* const to = count > kUsual ? many.data() + count : usual_to.data();
-    for (int n = 0; n < count; ++n) {
-        const int corner = corners.corner[begin + n], k = corner % 3;
-        const Triangle& t = triangles[corner / 3];
-        from[n] = t[kNext[k]];
-        to[n] = t[kNext[kNext[k]]];
-    }
+/// Whether edges, `count` > 0 of them, are one cycle: from the first on, each goes on where the last ended.
+/// Up to `width` there must be entries that no edge has.
+template <typename Width>
+bool are_cycle(const int* from, const int* to, int count, Width width) {
     int at = from[0];
     for (int left = count; left > 0; --left) {
         int next = 0, found = 0;
-        for (int n = 0; n < count; ++n) {  // without a branch, which would be mispredicted
+        for (int n = 0; n < width; ++n) {  // without a branch, which would be mispredicted
             next += from[n] == at ? n : 0;
             found += from[n] == at;
         }
@@ -104,6 +96,29 @@ bool is_fan(int v, const Corners& corners, const std::vector<Triangle>& triangle
         if (at == from[0]) return left == 1;
     }
     return false;
+}
+
+/// Whether the triangles at a vertex are a single fan: the edges opposite to it are one cycle.
+bool is_fan(int v, const Corners& corners, const std::vector<Triangle>& triangles) {
+    constexpr int kNext[] = {1, 2, 0};
+    constexpr int kFew = 8, kUsual = 16;  // triangles
+    std::array<int, kUsual> usual_from, usual_to;
+    std::vector<int> many;
+    const int begin = corners.first[v], count = corners.first[v + 1] - begin;
+    if (count > kUsual) many.resize(2 * count);
+    int* const from = count > kUsual ? many.data() : usual_from.data();
+    int* const to = count > kUsual ? many.data() + count : usual_to.data();
+    if (count <= kUsual) usual_from.fill(-1);
+    for (int n = 0; n < count; ++n) {
+        const int corner = corners.corner[begin + n], k = corner % 3;
+        const Triangle& t = triangles[corner / 3];
+        from[n] = t[kNext[k]];
+        to[n] = t[kNext[kNext[k]]];
+    }
+    // With a width that is known to the compiler all are looked at at once.
+    if (count <= kFew) return are_cycle(from, to, count, std::integral_constant<int, kFew>());
+    if (count <= kUsual) return are_cycle(from, to, count, std::integral_constant<int, kUsual>());
+    return are_cycle(from, to, count, count);
 }
 
 }  // namespace
