@@ -11,8 +11,8 @@ namespace isotrack {
 
 void keep_little_memory() {
 #ifdef __GLIBC__
-    // What a thread freed is of no use to those of other arenas. With one for two threads they seldom wait
-    // for each other.
+    // What a thread has freed is of no use to those with another arena. With one for two cores threads seldom
+    // wait for each other.
     mallopt(M_ARENA_MAX, std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / 2));
     // What is used anew in each stage had better not come from the system each time, page by page: blocks up
     // to the largest that may be kept are. Fixed, else both thresholds go with the blocks that are freed.

@@ -276,7 +276,7 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
     };
 
     // Writes a frame and then reads the next but one, while that between them is tracked: two grids at once,
-    // not three. One thread, because the allocator keeps for each what it has freed.
+    // not three. One thread, because the allocator may keep for each what it has freed.
     boost::asio::thread_pool beside(1);
     const auto start_reading = [&](std::size_t i) {
         if (i >= input.frames.size() || skipped(input.frames[i])) return std::future<ReadFrame>();

@@ -22,12 +22,11 @@ std::vector<Piece> make_pieces(const Adjacency& ring, const std::vector<Vec3>& a
     const std::size_t n = at.size(), size = std::max(kPieceSize, n / kMostPieces);
     std::vector<int> piece_of(n, -1);
     std::vector<Piece> pieces;
+    std::vector<int> some;
     for (std::size_t first = 0; first < n; ++first) {
         if (piece_of[first] >= 0) continue;
         const int number = static_cast<int>(pieces.size());
-        std::vector<int> some;
-        some.reserve(size);
-        some.push_back(static_cast<int>(first));
+        some.assign(1, static_cast<int>(first));
         piece_of[first] = number;
         int neighbour = -1;
         for (std::size_t next = 0; next < some.size(); ++next)
@@ -42,7 +41,7 @@ std::vector<Piece> make_pieces(const Adjacency& ring, const std::vector<Vec3>& a
             auto& of_neighbour = pieces[neighbour].particles;
             of_neighbour.insert(of_neighbour.end(), some.begin(), some.end());
         } else {
-            pieces.emplace_back().particles = std::move(some);
+            pieces.emplace_back().particles = some;
         }
     }
     std::vector<int> beside;

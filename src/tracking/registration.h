@@ -12,7 +12,7 @@
 
 namespace isotrack {
 
-/// The crossings of a surface, made when they are first asked for.
+/// The crossings of a surface, which may still be in the making: who asks waits for them.
 using Crossings = std::function<const CrossingGrid&()>;
 
 /// Where the particles come to on `surface` from a guess (a finite place for each) when what is next to each

@@ -1,13 +1,13 @@
 #include "isotrack/tracking/tracker.h"
 
 #include <tbb/parallel_invoke.h>
-#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <functional>
 
+#include "beside.h"
 #include "delaunay/spatial_order.h"
 #include "delaunay/update_cost.h"
 #include "isotrack/error.h"
@@ -120,8 +120,9 @@ bool Tracker::Impl::astray() const {
 void Tracker::Impl::tetrahedralise(bool moved, std::map<std::string, double>& seconds,
                                    const std::function<void()>& meanwhile, int busy) {
     round_to_float(particles);
-    tbb::task_group beside;
-    if (meanwhile) beside.run(meanwhile);
+    Beside beside([&] {
+        if (meanwhile) meanwhile();
+    });
     {
         const StageTimer timer(seconds, "delaunay");
         if (moved) labels.clear();
@@ -375,11 +376,11 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     const SizingLimits& l = work.limits;
     TrackedFrame& frame = work.frame;
     const double apart = options.method == Method::Paper ? kDenseSeeds : kSparseSeeds;
-    tbb::task_group beside;  // as a registration is in part the work of one thread
-    beside.run([&] { work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface)); });
+    // Beside the carry, as a registration is in part the work of one thread.
+    Beside finding([&] { work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface)); });
     const auto crossings = [&]() -> const CrossingGrid& {
-        beside.wait();
-        return *work.crossings;
+        finding.wait();
+        return work.crossings.value();
     };
     {
         const StageTimer timer(frame.seconds, "carry");

@@ -98,8 +98,8 @@ struct TrackedFrame {
     /// following every detail would take more particles than half the lattice crossings (at half a voxel;
     /// more at less).
     bool within_tolerance = true;
-    /// Per stage: carry, cover, size, relax, delaunay, convect, fit, certify, blunt. What is covered is found
-    /// beside the carry: cover is the time that it takes longer.
+    /// Per stage: carry, cover, size, relax, delaunay, convect, fit, certify, blunt. The lattice crossings are
+    /// found beside the carry; cover has what they take longer, and the seeding.
     std::map<std::string, double> seconds;
 };
 
