@@ -123,7 +123,6 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
     std::vector<Vec3> to = vertices;
     std::vector<Eigen::Vector3f> last(moving.size(), Eigen::Vector3f::Zero());  // steps
     ThreadProbes probes(surface);
-    SpoiltSteps spoilt_steps(triangles, movable);
     Chebyshev pace;
     for (int step = 0; step < steps; ++step, pace.next()) {
         parallel_for_each(moving.size(), kVertexGrain, [&](std::size_t m) {
@@ -142,7 +141,7 @@ void fit_steps(std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
             if (length > limit) move *= limit / length;
             to[v] = vertices[v] + move;
         });
-        spoilt_steps.undo(vertices, to);
+        undo_spoilt_steps(vertices, to, triangles, movable);
         if (step + 1 < steps)
             parallel_for_each(triangles.size(), kTriangleGrain, [&](std::size_t t) {
                 const auto& [i, j, k] = triangles[t];

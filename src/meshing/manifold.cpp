@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <tuple>
-#include <type_traits>
 #include <utility>
 
 #include "find_in_blocks.h"
@@ -80,14 +79,28 @@ struct HalfEdge {
     }
 };
 
-/// Whether edges, `count` > 0 of them, are one cycle: from the first on, each goes on where the last ended.
-/// Up to `width` there must be entries that no edge has.
-template <typename Width>
-bool are_cycle(const int* from, const int* to, int count, Width width) {
+/// Whether the triangles at a vertex are a single fan: from each to the next around it they come back to the
+/// first after all, and no edge is met twice.
+bool is_fan(int v, const Corners& corners, const std::vector<Triangle>& triangles) {
+    constexpr int kNext[] = {1, 2, 0};
+    constexpr int kUsual = 16;  // triangles, at most
+    std::array<int, kUsual> usual_from, usual_to;
+    std::vector<int> many;
+    const int begin = corners.first[v], count = corners.first[v + 1] - begin;
+    if (count > kUsual) many.resize(2 * count);
+    // Of the edge opposite v in each.
+    int* const from = count > kUsual ? many.data() : usual_from.data();
+    int* const to = count > kUsual ? many.data() + count : usual_to.data();
+    for (int n = 0; n < count; ++n) {
+        const int corner = corners.corner[begin + n], k = corner % 3;
+        const Triangle& t = triangles[corner / 3];
+        from[n] = t[kNext[k]];
+        to[n] = t[kNext[kNext[k]]];
+    }
     int at = from[0];
     for (int left = count; left > 0; --left) {
         int next = 0, found = 0;
-        for (int n = 0; n < width; ++n) {  // without a branch, which would be mispredicted
+        for (int n = 0; n < count; ++n) {  // without a branch, which would be mispredicted
             next += from[n] == at ? n : 0;
             found += from[n] == at;
         }
@@ -96,29 +109,6 @@ bool are_cycle(const int* from, const int* to, int count, Width width) {
         if (at == from[0]) return left == 1;
     }
     return false;
-}
-
-/// Whether the triangles at a vertex are a single fan: the edges opposite to it are one cycle.
-bool is_fan(int v, const Corners& corners, const std::vector<Triangle>& triangles) {
-    constexpr int kNext[] = {1, 2, 0};
-    constexpr int kFew = 8, kUsual = 16;  // triangles
-    std::array<int, kUsual> usual_from, usual_to;
-    std::vector<int> many;
-    const int begin = corners.first[v], count = corners.first[v + 1] - begin;
-    if (count > kUsual) many.resize(2 * count);
-    int* const from = count > kUsual ? many.data() : usual_from.data();
-    int* const to = count > kUsual ? many.data() + count : usual_to.data();
-    if (count <= kUsual) usual_from.fill(-1);
-    for (int n = 0; n < count; ++n) {
-        const int corner = corners.corner[begin + n], k = corner % 3;
-        const Triangle& t = triangles[corner / 3];
-        from[n] = t[kNext[k]];
-        to[n] = t[kNext[kNext[k]]];
-    }
-    // With a width that is known to the compiler all are looked at at once.
-    if (count <= kFew) return are_cycle(from, to, count, std::integral_constant<int, kFew>());
-    if (count <= kUsual) return are_cycle(from, to, count, std::integral_constant<int, kUsual>());
-    return are_cycle(from, to, count, count);
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "meshing/spoilt_steps.h"
 
+#include <utility>
+
 #include "find_in_blocks.h"
 #include "meshing/sharpness.h"
 
@@ -21,15 +23,16 @@ bool spoilt(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& a_to, const
 
 }  // namespace
 
-void SpoiltSteps::undo(const std::vector<Vec3>& vertices, std::vector<Vec3>& to) {
+void undo_spoilt_steps(const std::vector<Vec3>& vertices, std::vector<Vec3>& to,
+                       const std::vector<Triangle>& triangles, const std::vector<char>& movable) {
     const auto spoilt_among = [&](const auto& is_looked_at) {
         constexpr std::size_t kTrianglesPerBlock = 1024;
         return find_in_blocks<int>(
-            triangles_.size(), kTrianglesPerBlock,
+            triangles.size(), kTrianglesPerBlock,
             [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
                 for (std::size_t t = begin; t < end; ++t) {
-                    const auto& [i, j, k] = triangles_[t];
-                    if (is_looked_at(triangles_[t]) &&
+                    const auto& [i, j, k] = triangles[t];
+                    if (is_looked_at(triangles[t]) &&
                         spoilt(vertices[i], vertices[j], vertices[k], to[i], to[j], to[k]))
                         found.push_back(static_cast<int>(t));
                 }
@@ -37,15 +40,15 @@ void SpoiltSteps::undo(const std::vector<Vec3>& vertices, std::vector<Vec3>& to)
     };
     // All triangles, then those around what was undone: to look for them in all costs less than to list them.
     std::vector<int> bad = spoilt_among([](const Triangle&) { return true; });
+    std::vector<char> undone(bad.empty() ? 0 : vertices.size(), 0);  // in this pass
     for (int pass = 0; !bad.empty(); ++pass) {
+        std::vector<int> back;
         for (const int t : bad)
-            for (const int v : triangles_[t])
-                if (movable_[v]) back_.add(v);
-        for (const int v : back_.list())
-            to[v] = pass < kHalvings ? Vec3(0.5 * (vertices[v] + to[v])) : vertices[v];
-        bad = spoilt_among(
-            [&](const Triangle& t) { return back_.has(t[0]) || back_.has(t[1]) || back_.has(t[2]); });
-        back_.clear();
+            for (const int v : triangles[t])
+                if (movable[v] && !std::exchange(undone[v], 1)) back.push_back(v);
+        for (const int v : back) to[v] = pass < kHalvings ? Vec3(0.5 * (vertices[v] + to[v])) : vertices[v];
+        bad = spoilt_among([&](const Triangle& t) { return undone[t[0]] || undone[t[1]] || undone[t[2]]; });
+        for (const int v : back) undone[v] = 0;
     }
 }
 

@@ -96,7 +96,7 @@ fi
 
 echo "Resolution, at the same tolerance in world units, half a voxel of 256 per diagonal; seconds. Reading a file, which volumeToMesh would have to do as well, is not in the total."
 echo
-echo "| voxels per diagonal | active voxels | particles | read | open | carry and cover | other stages | total | volumeToMesh, adaptivity 0.1 | 0 | total over 0.1 | over 0 | carry and cover, ns per active voxel |"
+echo "| voxels per diagonal | active voxels | particles | read | open | cover | other stages | total | volumeToMesh, adaptivity 0.1 | 0 | total over 0.1 | over 0 | carry and cover, ns per active voxel |"
 echo "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
 write --per-diagonal 256 --frames 1
 tolerance=$(calculate "0.5 * $voxel")
@@ -106,10 +106,10 @@ for size in "$@"; do
     least=$(cat "$work/least" 2>/dev/null || true)
     evaluate -v size="$size" -v least="$least" -v least_file="$work/least" '
         END {
-            total = value["open"] + value["advance"]; cover = value["carry"] + value["cover"]
-            others = value["advance"] - cover; nanoseconds = 1e9 * cover / value["voxels"]
+            total = value["open"] + value["advance"]; others = value["advance"] - value["cover"]
+            nanoseconds = 1e9 * (value["carry"] + value["cover"]) / value["voxels"]
             printf "| %d | %d | %d | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | %.2f | %.0f |\n", size, value["voxels"],
-                   value["particles"], value["read"], value["open"], cover, others, total, value["adaptive"], value["uniform"],
+                   value["particles"], value["read"], value["open"], value["cover"], others, total, value["adaptive"], value["uniform"],
                    total / value["adaptive"], total / value["uniform"], nanoseconds
             miss(value["not_kept"] > 0, size ": tolerance not kept")
             miss(nanoseconds > 30, sprintf("%d: carry and cover %.0f ns per active voxel", size, nanoseconds))
@@ -120,7 +120,7 @@ for size in "$@"; do
         }'
 done
 echo
-echo "The crossings that are covered are found beside the carry. Wanted: both together at most 30 ns per active voxel; the time of the other stages does not grow (by no more than a tenth); the total below volumeToMesh's at adaptivity 0.1 from 1024 on, at adaptivity 0 from 2048 on."
+echo "The crossings that are covered are found beside the carry, which takes longer for it: it is among the other stages. Wanted: carry and cover together at most 30 ns per active voxel; the time of the other stages does not grow (by no more than a tenth); the total below volumeToMesh's at adaptivity 0.1 from 1024 on, at adaptivity 0 from 2048 on."
 print_missed
 
 echo

@@ -60,7 +60,7 @@ TEST(SpoiltSteps, LeaveNoTriangleSpoiltAndShortenThoseOfWholeTriangles) {
     for (unsigned seed = 1; seed <= 20; ++seed) {
         const Sheet sheet(seed);
         std::vector<Vec3> to = sheet.to;
-        SpoiltSteps(sheet.triangles, sheet.movable).undo(sheet.from, to);
+        undo_spoilt_steps(sheet.from, to, sheet.triangles, sheet.movable);
         std::vector<char> may_be_shorter(to.size(), 0);  // in a triangle where all are
         for (const Triangle& t : sheet.triangles) {
             spoilt += sheet.is_spoilt(t, sheet.to);
