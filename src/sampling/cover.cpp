@@ -24,8 +24,7 @@ constexpr double kOffPlane =
 constexpr double kGrazing = 0.01, kHere = 0.1;  // kHere: spacings of the crossings
 constexpr double kRounding = 1e-5;              // of a particle's normal
 constexpr std::size_t kBatch = 128;
-// Above it small features are stepped over: spacings of the crossings, or tolerances or resolutions.
-constexpr double kLargestSeed = 5.0, kLargestSeedForError = 10.0;
+constexpr double kWidestFlatSeed = 10.0;  // tolerances
 
 /// A shuffled order that depends on the seed and the count alone [splitmix64].
 std::uint64_t mix(std::uint64_t x) {
@@ -37,8 +36,15 @@ std::uint64_t mix(std::uint64_t x) {
 
 }  // namespace
 
+double widest_seed(const Sowing& sowing, const Surface& surface, const CrossingGrid& crossings,
+                   const SizingLimits& limits) {
+    constexpr double kSpacings = 5.0, kResolutions = 10.0;
+    const double for_error = std::min(sowing.widest * limits.tolerance, kResolutions * surface.resolution());
+    return std::max({kSpacings * crossings.spacing(), limits.min_edge, for_error});
+}
+
 std::size_t cover(Particles& particles, const Surface& surface, const CrossingGrid& grid,
-                  const SizingLimits& limits, std::uint64_t seed, Id& next_id, double apart) {
+                  const SizingLimits& limits, std::uint64_t seed, Id& next_id, const Sowing& sowing) {
     if (grid.empty()) return 0;
     const double spacing = grid.spacing();
     std::vector<std::atomic<char>> covered(grid.size());  // marked by several threads
@@ -96,10 +102,8 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
         double spacing = 0.0;  // none: there is no surface here
     };
     ThreadProbes probes(surface);
-    const double largest =
-                     std::max({kLargestSeed * spacing, limits.min_edge,
-                               kLargestSeedForError * std::min(limits.tolerance, surface.resolution())}),
-                 largest_flat = std::max(largest, kLargestSeedForError * limits.tolerance);
+    const double widest = widest_seed(sowing, surface, grid, limits),
+                 widest_flat = std::max(widest, kWidestFlatSeed * limits.tolerance);
     const auto seed_at = [&](int c, Surface::Probe& probe) -> Seed {
         const Surface::Crossing crossing = grid[c];
         const Vec3 start = crossing.point;
@@ -109,7 +113,7 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
         if (!(n.squaredNorm() > 0.0)) return {};
         return {*p, n,
                 std::min(spacing_from_curvature(probe, *p, n, spacing, limits),
-                         crossing.flat ? largest_flat : largest)};
+                         crossing.flat ? widest_flat : widest)};
     };
     std::size_t added = 0;
     std::vector<int> batch;
@@ -133,7 +137,7 @@ std::size_t cover(Particles& particles, const Surface& surface, const CrossingGr
                 const auto& [p, n, h] = seeds[i];
                 if (!(h > 0.0)) continue;
                 particles.add(p, n, h, next_id++);
-                sown.push_back(disc_of(p, n, apart * h, apart * std::min(h, largest)));
+                sown.push_back(disc_of(p, n, sowing.apart * h, sowing.apart * std::min(h, widest)));
             }
             added += sown.size();
             parallel_for_each(sown.size(), 8, [&](std::size_t i) { mark(grid, own_number, sown[i]); });

@@ -46,7 +46,7 @@ constexpr Pace kFollowing{{0.7, 1.1}, 0.3, 3};
 constexpr double kThinned = 0.85;      // of the tolerance: error of triangles that close the gap of a death
 constexpr double kUnfitted = 1.3;      // times what a fit leaves of an error
 constexpr int kMostLayers = 4;         // of newborn around those that move
-constexpr double kFewWithError = 0.9;  // of the particles: smooth surfaces have more
+constexpr double kFewWithError = 0.9;  // of the particles, seeds of a dense sowing: smooth surfaces have more
 constexpr double kThick = 3.0, kThickNodes = 6.0;  // tolerances, resolutions: of a solid without thin parts
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr double kDetail = 2.0;       // tolerances
@@ -261,21 +261,30 @@ void Tracker::Impl::measure(FrameWork& work) {
 }
 
 /// The first particles, in order.
-void Tracker::Impl::seed(FrameWork& work, double apart) {
+void Tracker::Impl::seed(FrameWork& work, const Sowing& sowing) {
     const StageTimer timer(work.frame.seconds, "cover");
     particles = {};
     last_mesh = {};
     work.frame.seeded =
-        cover(particles, work.surface, *work.crossings, work.limits, options.seed, next_id, apart);
+        cover(particles, work.surface, *work.crossings, work.limits, options.seed, next_id, sowing);
     arrange();
+}
+
+/// By the first mesh of a fit: many of its particles have no error. Wide seeds leave fewer of those.
+bool Tracker::Impl::has_flat_faces(const FrameWork& work) const {
+    const auto widest = [&](const Sowing& sowing) {
+        return widest_seed(sowing, work.surface, *work.crossings, work.limits);
+    };
+    const double wider = widest(kSparseSeedsFitted) / widest(kDenseSeeds);
+    return 1.0 - share_with_error(last_mesh.evidence, work.limits) >
+           (1.0 - kFewWithError) / std::pow(wider, 3.0);
 }
 
 /// Rounds of: mesh, measure, follow.
 void Tracker::Impl::sample(FrameWork& work, bool warm) {
     measure(work);
     // Where flat faces meet nearly all of the mean square is at few particles, and certify adds none for it.
-    const bool dense =
-        options.fit && !warm && share_with_error(last_mesh.evidence, work.limits) < kFewWithError;
+    const bool dense = options.fit && !warm && has_flat_faces(work);
     if (dense) {
         seed(work, kDenseSeeds);
         measure(work);
@@ -375,7 +384,9 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     const Surface& surface = work.surface;
     const SizingLimits& l = work.limits;
     TrackedFrame& frame = work.frame;
-    const double apart = options.method == Method::Paper ? kDenseSeeds : kSparseSeeds;
+    const Sowing& sowing = options.method == Method::Paper ? kDenseSeeds
+                           : options.fit                   ? kSparseSeedsFitted
+                                                           : kSparseSeeds;
     // Beside the carry, as a registration is in part the work of one thread.
     Beside finding([&] { work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface)); });
     const auto crossings = [&]() -> const CrossingGrid& {
@@ -395,9 +406,9 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     {
         const StageTimer timer(frame.seconds, "cover");
         work.inspector.emplace(surface, l, crossings());
-        if (warm) frame.seeded = cover(particles, surface, crossings(), l, options.seed, next_id, apart);
+        if (warm) frame.seeded = cover(particles, surface, crossings(), l, options.seed, next_id, sowing);
     }
-    if (!warm) seed(work, apart);
+    if (!warm) seed(work, sowing);
     work.follows =
         warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size());
     if (options.method == Method::Paper)

@@ -10,6 +10,7 @@
 
 #include "isotrack/delaunay/tetrahedralisation.h"
 #include "isotrack/meshing/convection.h"
+#include "isotrack/sampling/cover.h"
 #include "isotrack/sampling/population.h"
 #include "isotrack/tracking/tracker.h"
 #include "tracking/frame_work.h"
@@ -85,7 +86,8 @@ struct Tracker::Impl {
     void retain(const std::vector<char>& keep);  // particles, and what is known of them
     void make_room(const Surface& surface, TrackedFrame& frame);
     void measure(FrameWork& work);
-    void seed(FrameWork& work, double apart);
+    void seed(FrameWork& work, const Sowing& sowing);
+    bool has_flat_faces(const FrameWork& work) const;
     void sample(FrameWork& work, bool warm);
     void sample_as_in_paper(const Surface& surface, const SizingLimits& l, bool warm, TrackedFrame& frame);
     void place_particles(const Motion& motion, FrameWork& work);

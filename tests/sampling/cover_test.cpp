@@ -102,6 +102,31 @@ TEST(Cover, FindsADropOfASingleVoxel) {
               4u);  // enough for a tetrahedron
 }
 
+TEST(Cover, SowsWiderWhatIsFitted) {
+    // Flatter than either sowing is wide: seeds are as far apart as it lets them.
+    constexpr double kSpacing = 0.05;
+    const auto surface = shapes::sphere({0.01, 0.02, 0.03}, 60.0 * kSpacing, kSpacing);
+    const CrossingGrid crossings(*surface);
+    SizingLimits limits = limits_of(kSpacing);
+    limits.max_edge = 100.0 * kSpacing;
+    limits.tolerance = 0.4 * kSpacing;
+    std::vector<double> widest;
+    std::vector<std::size_t> added;
+    for (const Sowing& sowing : {kSparseSeeds, kSparseSeedsFitted}) {
+        widest.push_back(widest_seed(sowing, *surface, crossings, limits));
+        Particles particles;
+        Id next_id = 0;
+        added.push_back(cover(particles, *surface, crossings, limits, 1, next_id, sowing));
+        EXPECT_EQ(cover(particles, *surface, crossings, limits, 1, next_id, sowing), 0u);
+        for (const double h : particles.spacing) EXPECT_LE(h, widest.back());
+    }
+    EXPECT_DOUBLE_EQ(widest[0], 5.0 * kSpacing);  // ten tolerances are less
+    EXPECT_DOUBLE_EQ(widest[1], 8.0 * kSpacing);
+    EXPECT_LT(3 * added[1], 2 * added[0]);
+    limits.tolerance = 2.0 * kSpacing;
+    EXPECT_DOUBLE_EQ(widest_seed(kSparseSeedsFitted, *surface, crossings, limits), 10.0 * kSpacing);
+}
+
 TEST(Cover, MendsOnlyTheHole) {
     const auto surface = shapes::sphere({0.01, 0.02, 0.03}, 1.0, 0.05);
     Particles particles;

@@ -9,11 +9,22 @@
 
 namespace isotrack {
 
-/// Seeds this share of their spacing apart, at random, are a little sparse: where the tolerance is missed
-/// certify adds what it takes, which is fewer than are left when there were too many.
-constexpr double kSparseSeeds = 0.9;
+/// How far apart seeds are.
+struct Sowing {
+    double apart;   ///< Of their spacing, at random.
+    double widest;  ///< Tolerances: the largest spacing, if that is not too large or small, see below.
+};
+/// A little sparse: where the tolerance is missed certify adds what it takes, which is fewer than are left
+/// when there were too many. A fit leaves so small an error on what is hardly curved that it can begin with
+/// wider ones; without it, as much as these save is added again where edges are short.
+constexpr Sowing kSparseSeeds{0.9, 10.0}, kSparseSeedsFitted{0.9, 20.0};
 /// A little dense, for what no certify adds.
-constexpr double kDenseSeeds = 0.7;
+constexpr Sowing kDenseSeeds{0.7, 10.0};
+
+/// The largest spacing of seeds where the surface is no flat sheet, world units: 10 resolutions at most, as
+/// above it small features are stepped over, and at least 5 of the crossings' spacings.
+double widest_seed(const Sowing& sowing, const Surface& surface, const CrossingGrid& crossings,
+                   const SizingLimits& limits);
 
 /// Adds particles where the surface has none near, until every crossing of the surface's lattice is covered:
 /// within reach of a particle that faces the same way and in whose tangent plane it nearly lies. With no
@@ -21,6 +32,7 @@ constexpr double kDenseSeeds = 0.7;
 /// smooth surface no two are much nearer, in an order shuffled by `seed`. `crossings`: of the surface.
 /// Returns how many were added; new ids count on from `next_id`.
 std::size_t cover(Particles& particles, const Surface& surface, const CrossingGrid& crossings,
-                  const SizingLimits& limits, std::uint64_t seed, Id& next_id, double apart = kSparseSeeds);
+                  const SizingLimits& limits, std::uint64_t seed, Id& next_id,
+                  const Sowing& sowing = kSparseSeeds);
 
 }  // namespace isotrack
