@@ -40,7 +40,7 @@ double widest_seed(const Sowing& sowing, const Surface& surface, const CrossingG
                    const SizingLimits& limits) {
     constexpr double kSpacings = 5.0, kResolutions = 10.0;
     const double for_error = std::min(sowing.widest * limits.tolerance, kResolutions * surface.resolution());
-    return std::max({kSpacings * crossings.spacing(), limits.min_edge, for_error});
+    return std::min(limits.max_edge, std::max({kSpacings * crossings.spacing(), limits.min_edge, for_error}));
 }
 
 std::size_t cover(Particles& particles, const Surface& surface, const CrossingGrid& grid,

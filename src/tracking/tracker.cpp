@@ -46,7 +46,7 @@ constexpr Pace kFollowing{{0.7, 1.1}, 0.3, 3};
 constexpr double kThinned = 0.85;      // of the tolerance: error of triangles that close the gap of a death
 constexpr double kUnfitted = 1.3;      // times what a fit leaves of an error
 constexpr int kMostLayers = 4;         // of newborn around those that move
-constexpr double kFewWithError = 0.9;  // of the particles, seeds of a dense sowing: smooth surfaces have more
+constexpr double kFewWithError = 0.9;  // of the particles: smooth surfaces have more
 constexpr double kThick = 3.0, kThickNodes = 6.0;  // tolerances, resolutions: of a solid without thin parts
 constexpr double kMostSeeded = 0.05;  // of the particles; with more the next frame is half a cold start
 constexpr double kDetail = 2.0;       // tolerances
@@ -270,14 +270,16 @@ void Tracker::Impl::seed(FrameWork& work, const Sowing& sowing) {
     arrange();
 }
 
-/// By the first mesh of a fit: many of its particles have no error. Wide seeds leave fewer of those.
+/// By the first mesh, of a fit: many of its particles have no error.
 bool Tracker::Impl::has_flat_faces(const FrameWork& work) const {
+    // Of wider seeds fewer lie on flat faces: by the square of the width, and more next to their edges.
+    constexpr double kFewerByWidth = 3.0;
     const auto widest = [&](const Sowing& sowing) {
         return widest_seed(sowing, work.surface, *work.crossings, work.limits);
     };
-    const double wider = widest(kSparseSeedsFitted) / widest(kDenseSeeds);
-    return 1.0 - share_with_error(last_mesh.evidence, work.limits) >
-           (1.0 - kFewWithError) / std::pow(wider, 3.0);
+    const double wider = widest(kSparseSeedsFitted) / widest(kSparseSeeds),
+                 without = 1.0 - share_with_error(last_mesh.evidence, work.limits);
+    return without * std::pow(wider, kFewerByWidth) > 1.0 - kFewWithError;
 }
 
 /// Rounds of: mesh, measure, follow.
@@ -384,9 +386,7 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     const Surface& surface = work.surface;
     const SizingLimits& l = work.limits;
     TrackedFrame& frame = work.frame;
-    const Sowing& sowing = options.method == Method::Paper ? kDenseSeeds
-                           : options.fit                   ? kSparseSeedsFitted
-                                                           : kSparseSeeds;
+    const Sowing sowing = options.method == Method::Paper ? kDenseSeeds : kSparseSeeds;
     // Beside the carry, as a registration is in part the work of one thread.
     Beside finding([&] { work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface)); });
     const auto crossings = [&]() -> const CrossingGrid& {
@@ -408,7 +408,7 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
         work.inspector.emplace(surface, l, crossings());
         if (warm) frame.seeded = cover(particles, surface, crossings(), l, options.seed, next_id, sowing);
     }
-    if (!warm) seed(work, sowing);
+    if (!warm) seed(work, options.fit && options.method != Method::Paper ? kSparseSeedsFitted : sowing);
     work.follows =
         warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size());
     if (options.method == Method::Paper)

@@ -102,7 +102,7 @@ TEST(Cover, FindsADropOfASingleVoxel) {
               4u);  // enough for a tetrahedron
 }
 
-TEST(Cover, SowsWiderWhatIsFitted) {
+TEST(Cover, SowsAsWideAsTheSowingSays) {
     // Flatter than either sowing is wide: seeds are as far apart as it lets them.
     constexpr double kSpacing = 0.05;
     const auto surface = shapes::sphere({0.01, 0.02, 0.03}, 60.0 * kSpacing, kSpacing);
@@ -110,21 +110,29 @@ TEST(Cover, SowsWiderWhatIsFitted) {
     SizingLimits limits = limits_of(kSpacing);
     limits.max_edge = 100.0 * kSpacing;
     limits.tolerance = 0.4 * kSpacing;
-    std::vector<double> widest;
+    const auto widest = [&](const Sowing& sowing, const CrossingGrid& grid) {
+        return widest_seed(sowing, *surface, grid, limits);
+    };
+    EXPECT_DOUBLE_EQ(widest(kSparseSeeds, crossings), 5.0 * kSpacing);  // ten tolerances are less
+    EXPECT_DOUBLE_EQ(widest(kSparseSeedsFitted, crossings), 8.0 * kSpacing);
     std::vector<std::size_t> added;
     for (const Sowing& sowing : {kSparseSeeds, kSparseSeedsFitted}) {
-        widest.push_back(widest_seed(sowing, *surface, crossings, limits));
         Particles particles;
         Id next_id = 0;
         added.push_back(cover(particles, *surface, crossings, limits, 1, next_id, sowing));
         EXPECT_EQ(cover(particles, *surface, crossings, limits, 1, next_id, sowing), 0u);
-        for (const double h : particles.spacing) EXPECT_LE(h, widest.back());
+        for (const double h : particles.spacing) EXPECT_DOUBLE_EQ(h, widest(sowing, crossings));
     }
-    EXPECT_DOUBLE_EQ(widest[0], 5.0 * kSpacing);  // ten tolerances are less
-    EXPECT_DOUBLE_EQ(widest[1], 8.0 * kSpacing);
     EXPECT_LT(3 * added[1], 2 * added[0]);
+
     limits.tolerance = 2.0 * kSpacing;
-    EXPECT_DOUBLE_EQ(widest_seed(kSparseSeedsFitted, *surface, crossings, limits), 10.0 * kSpacing);
+    EXPECT_DOUBLE_EQ(widest(kSparseSeedsFitted, crossings), 10.0 * kSpacing);
+    EXPECT_DOUBLE_EQ(widest(kSparseSeedsFitted, CrossingGrid(*surface, 3.0 * kSpacing)), 15.0 * kSpacing);
+    limits.min_edge = 20.0 * kSpacing;
+    EXPECT_DOUBLE_EQ(widest(kSparseSeedsFitted, crossings), limits.min_edge);
+    limits.min_edge = kSpacing;
+    limits.max_edge = 4.0 * kSpacing;
+    EXPECT_DOUBLE_EQ(widest(kSparseSeedsFitted, crossings), limits.max_edge);
 }
 
 TEST(Cover, MendsOnlyTheHole) {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -129,6 +130,21 @@ TEST(Tracker, FitsWithFewerTrianglesWithinTheSameTolerance) {
     // Particles stay on the surface.
     const auto probe = sphere->probe();
     for (const Vec3& p : tracker.particles().position) EXPECT_LT(std::abs(probe->value(p)), 1e-6);
+}
+
+TEST(Tracker, SowsWiderBeforeAFitButDenselyWhereFacesAreFlat) {
+    const auto seeded = [](const shapes::SurfacePtr& solid, bool fit, std::optional<double> max_edge) {
+        TrackerOptions options = with_tolerance(0.5 * kVoxel);
+        options.fit = fit;
+        options.max_edge = max_edge;
+        return Tracker(options).advance(LevelSet(rasterise(*solid, kVoxel))).seeded;
+    };
+    const auto smooth = shapes::ellipsoid({0, 0, 0}, {3.0, 2.4, 2.0}, kVoxel);
+    const auto flat = shapes::box({0, 0, 0}, {1.0, 0.8, 0.6}, kVoxel);
+    EXPECT_LT(3 * seeded(smooth, true, {}), 2 * seeded(smooth, false, {}));
+    EXPECT_GT(2 * seeded(flat, true, {}), 3 * seeded(flat, false, {}));
+    // No seeds can be wider than these, and it is as smooth as it was.
+    EXPECT_EQ(seeded(smooth, true, 4.0 * kVoxel), seeded(smooth, false, 4.0 * kVoxel));
 }
 
 TEST(Tracker, KeepsItsParticlesOnTheSurface) {

@@ -11,24 +11,25 @@ namespace isotrack {
 
 /// How far apart seeds are.
 struct Sowing {
-    double apart;   ///< Of their spacing, at random.
-    double widest;  ///< Tolerances: the largest spacing, if that is not too large or small, see below.
+    double apart;   ///< The share of their spacing, at random.
+    double widest;  ///< Tolerances: see `widest_seed`.
 };
 /// A little sparse: where the tolerance is missed certify adds what it takes, which is fewer than are left
-/// when there were too many. A fit leaves so small an error on what is hardly curved that it can begin with
-/// wider ones; without it, as much as these save is added again where edges are short.
-constexpr Sowing kSparseSeeds{0.9, 10.0}, kSparseSeedsFitted{0.9, 20.0};
+/// when there were too many. A fit leaves so small an error on what is hardly curved that a first mesh can do
+/// with wider ones; without it, as much as these save is added again where edges are short.
+inline constexpr Sowing kSparseSeeds{0.9, 10.0}, kSparseSeedsFitted{0.9, 20.0};
 /// A little dense, for what no certify adds.
-constexpr Sowing kDenseSeeds{0.7, 10.0};
+inline constexpr Sowing kDenseSeeds{0.7, 10.0};
 
-/// The largest spacing of seeds where the surface is no flat sheet, world units: 10 resolutions at most, as
-/// above it small features are stepped over, and at least 5 of the crossings' spacings.
+/// The largest spacing of seeds, world units: so many tolerances, but 10 resolutions at most, as above it
+/// small features are stepped over; never below 5 spacings of the crossings or `min_edge`, nor above
+/// `max_edge`. On flat sheets 10 tolerances, if that is more.
 double widest_seed(const Sowing& sowing, const Surface& surface, const CrossingGrid& crossings,
                    const SizingLimits& limits);
 
 /// Adds particles where the surface has none near, until every crossing of the surface's lattice is covered:
 /// within reach of a particle that faces the same way and in whose tangent plane it nearly lies. With no
-/// particles at all this is the cold start: each seed covers `apart` of its spacing, so that on
+/// particles at all this is the cold start: each seed covers `sowing.apart` of its spacing, so that on
 /// smooth surface no two are much nearer, in an order shuffled by `seed`. `crossings`: of the surface.
 /// Returns how many were added; new ids count on from `next_id`.
 std::size_t cover(Particles& particles, const Surface& surface, const CrossingGrid& crossings,
