@@ -2,8 +2,11 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 #include "isotrack/sampling/particles.h"
+#include "parallel_for_each.h"
 
 namespace isotrack {
 
@@ -29,6 +32,14 @@ inline Metric metric_of(double spacing, const Vec3& stretch) {
 
 inline Metric metric_of(const Particles& particles, std::size_t i) {
     return metric_of(particles.spacing[i], particles.stretch[i]);
+}
+
+/// Of each particle.
+inline std::vector<Metric> metrics_of(const Particles& particles) {
+    constexpr std::size_t kGrain = 1024;
+    std::vector<Metric> result(particles.size());
+    parallel_for_each(result.size(), kGrain, [&](std::size_t i) { result[i] = metric_of(particles, i); });
+    return result;
 }
 
 }  // namespace isotrack

@@ -41,12 +41,13 @@ std::vector<std::pair<double, int>> smallest_first(std::size_t count, const Meas
 
 std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency,
                             const PopulationBand& band) {
+    const std::vector<Metric> metrics = metrics_of(particles);
     const auto nearest_square = [&](std::size_t i) {
         double q = 1e300;
         for (const int j : adjacency.of(i)) {
             if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
             const Vec3 r = particles.position[j] - particles.position[i];
-            q = std::min(q, 0.5 * (metric_of(particles, i).square(r) + metric_of(particles, j).square(r)));
+            q = std::min(q, 0.5 * (metrics[i].square(r) + metrics[j].square(r)));
         }
         return q;
     };
@@ -66,14 +67,14 @@ namespace {
 struct MetricTriangle {
     const Particles& particles;
     const Triangle& corner;
-    const Metric metric[3];  // of each corner
+    const Metric metric[3];  // of each corner, from those of all particles
     double side2[3];         // squared, opposite each corner
     double area2_16;         // 16 times the squared area
 
-    MetricTriangle(const Particles& of, const Triangle& triangle)
+    MetricTriangle(const Particles& of, const std::vector<Metric>& metrics, const Triangle& triangle)
         : particles(of),
           corner(triangle),
-          metric{metric_of(of, triangle[0]), metric_of(of, triangle[1]), metric_of(of, triangle[2])} {
+          metric{metrics[triangle[0]], metrics[triangle[1]], metrics[triangle[2]]} {
         for (int k = 0; k < 3; ++k)
             side2[k] =
                 square(particles.position[corner[(k + 2) % 3]] - particles.position[corner[(k + 1) % 3]]);
@@ -103,8 +104,9 @@ struct MetricTriangle {
 std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triangle>& triangles,
                                   const Adjacency& ring, const Surface& surface, Id& next_id,
                                   const PopulationBand& band) {
+    const std::vector<Metric> metrics = metrics_of(particles);
     const auto minus_radius = [&](std::size_t t) {
-        const MetricTriangle triangle(particles, triangles[t]);
+        const MetricTriangle triangle(particles, metrics, triangles[t]);
         return triangle.area2_16 > 0.0 ? -triangle.circumradius() : 0.0;
     };
     const auto large = smallest_first(triangles.size(), minus_radius, -band.sparse);
@@ -114,7 +116,7 @@ std::vector<Triangle> fill_sparse(Particles& particles, const std::vector<Triang
     /// Where a particle would be born in a triangle, if nobody is near.
     const auto place_in = [&](const Triangle& corner, Surface::Probe& probe) -> std::optional<Place> {
         const auto& [a, b, c] = corner;
-        const MetricTriangle triangle(particles, corner);
+        const MetricTriangle triangle(particles, metrics, corner);
         // An obtuse triangle has its circumcentre far outside: stay within one spacing.
         const Vec3 middle = triangle.middle(), to_centre = triangle.circumcentre() - middle;
         const double off = std::sqrt(triangle.square(to_centre));

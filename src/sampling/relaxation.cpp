@@ -19,15 +19,13 @@ constexpr int kLongestBlock = 16;
 
 int relax(Particles& particles, const Adjacency& adjacency, const Surface& surface, int sweeps,
           const std::vector<char>& restless) {
-    const auto groups = colour_groups(adjacency, kLongestBlock);
+    const auto groups = colour_groups(adjacency, kLongestBlock, restless);
     ThreadProbes probes(surface);
-    std::vector<Metric> metrics;
-    metrics.reserve(particles.size());
-    for (std::size_t i = 0; i < particles.size(); ++i) metrics.push_back(metric_of(particles, i));
+    const std::vector<Metric> metrics = metrics_of(particles);
     std::vector<double> lambda(particles.size(), 0.1);
-    std::vector<char> moved(particles.size(), 1);
     std::vector<char> active = restless;
     if (active.empty()) active.assign(particles.size(), 1);
+    std::vector<char> moved = active;
     std::vector<Crease> crease(particles.size());
     int done = 0;
     const auto step = [&](int i, Surface::Probe& probe) {

@@ -1,6 +1,7 @@
 #include "tracking/last_mesh.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <atomic>
@@ -59,15 +60,17 @@ void LastMesh::make_ring(std::size_t particles) {
 }
 
 void LastMesh::retain(const std::vector<char>& keep) {
-    compact(evidence.error, keep);
-    compact(evidence.thickness, keep);
-    ring = ring.restricted(keep);
-    const std::vector<int> number = numbers_after(keep);
-    std::size_t kept = 0;
-    for (const Triangle& t : triangles)
-        if (keep[t[0]] && keep[t[1]] && keep[t[2]])
-            triangles[kept++] = {number[t[0]], number[t[1]], number[t[2]]};
-    triangles.resize(kept);
+    tbb::parallel_invoke([&] { ring = ring.restricted(keep); },
+                         [&] {
+                             compact(evidence.error, keep);
+                             compact(evidence.thickness, keep);
+                             const std::vector<int> number = numbers_after(keep);
+                             std::size_t kept = 0;
+                             for (const Triangle& t : triangles)
+                                 if (keep[t[0]] && keep[t[1]] && keep[t[2]])
+                                     triangles[kept++] = {number[t[0]], number[t[1]], number[t[2]]};
+                             triangles.resize(kept);
+                         });
 }
 
 void LastMesh::reorder(const std::vector<int>& order) {
@@ -81,6 +84,7 @@ void LastMesh::reorder(const std::vector<int>& order) {
 }
 
 void LastMesh::grow(std::size_t particles, const std::vector<Triangle>& parents) {
+    triangles.reserve(triangles.size() + 3 * parents.size());
     for (std::size_t k = 0; k < parents.size(); ++k) {
         const auto& [a, b, c] = parents[k];
         const int i = static_cast<int>(ring.size() + k);

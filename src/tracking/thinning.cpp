@@ -81,6 +81,7 @@ public:
           surface_(surface),
           crossings_(crossings),
           limits_(limits),
+          metrics_(metrics_of(particles)),
           corners_(particles.size(), triangles),
           fan_(particles.size()),
           keep_(particles.size(), 1),
@@ -154,14 +155,12 @@ private:
         return fan_[i];
     }
     double nearest_square(int i) const {
-        const Metric own = metric_of(particles_, static_cast<std::size_t>(i));
         double least = kInfinite;
         for_each_around(i, [&](int t) {
             for (const int j : triangles_[t]) {
                 if (j == i || !(particles_.normal[i].dot(particles_.normal[j]) > 0.0)) continue;
                 const Vec3 r = particles_.position[j] - particles_.position[i];
-                least = std::min(least, 0.5 * (own.square(r) +
-                                               metric_of(particles_, static_cast<std::size_t>(j)).square(r)));
+                least = std::min(least, 0.5 * (metrics_[i].square(r) + metrics_[j].square(r)));
             }
         });
         return least;
@@ -283,6 +282,7 @@ private:
     const Surface& surface_;
     const CrossingGrid& crossings_;
     const ThinningLimits limits_;
+    const std::vector<Metric> metrics_;
     const Corners corners_;              // of the start
     std::vector<std::vector<int>> fan_;  // the triangles of those that changed since
     std::vector<char> keep_;             // particles

@@ -342,6 +342,7 @@ void Tracker::Impl::follow(FrameWork& work, const Pace& pace, bool warm) {
 }
 
 void Tracker::Impl::retain(const std::vector<char>& keep) {
+    if (std::find(keep.begin(), keep.end(), 0) == keep.end()) return;
     tbb::parallel_invoke([&] { particles.retain(keep); }, [&] { last_mesh.retain(keep); });
 }
 

@@ -45,7 +45,7 @@ TEST(ColourGroups, HoldEveryParticleOnceAndNoNeighboursInTwoBlocks) {
     }
 }
 
-TEST(ColourGroups, HaveLongBlocksWhereNeighboursFollowEachOther) {
+TEST(ColourGroups, HaveLongBlocksWhereNeighboursFollowEachOtherAndNoneWithoutAnyOfSome) {
     std::vector<std::pair<int, int>> pairs;  // two chains
     for (const auto& [from, to] : {std::pair(0, 30), std::pair(30, 50)})
         for (int i = from; i + 1 < to; ++i) {
@@ -60,6 +60,14 @@ TEST(ColourGroups, HaveLongBlocksWhereNeighboursFollowEachOther) {
         return block.begin == begin && block.end == end;
     };
     EXPECT_TRUE(spans(groups[0][0], 0, 20) && spans(groups[1][0], 20, 30) && spans(groups[0][1], 30, 50));
+
+    std::vector<char> some(50, 0);
+    some[7] = some[29] = 1;
+    const auto of_some = colour_groups(from_pairs(pairs, 50), 20, some);
+    ASSERT_EQ(of_some.size(), 2u);
+    ASSERT_EQ(of_some[0].size(), 1u);  // without the other chain
+    ASSERT_EQ(of_some[1].size(), 1u);
+    EXPECT_TRUE(spans(of_some[0][0], 0, 20) && spans(of_some[1][0], 20, 30));
 }
 
 TEST(Relax, SpreadsRandomPointsAndKeepsThemOnTheSurface) {
