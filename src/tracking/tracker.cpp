@@ -65,6 +65,13 @@ void round_to_float(Particles& particles) {
     for (Vec3& p : particles.position) p = to_float_precision(p);
 }
 
+/// Of the paper's sampling no certify makes more; the rest is sparse, and wider before the first mesh of a
+/// fit.
+Sowing sowing_of(const TrackerOptions& options, bool warm) {
+    if (options.method == Method::Paper) return kDenseSeeds;
+    return options.fit && !warm ? kSparseSeedsFitted : kSparseSeeds;
+}
+
 /// What is smaller need not be looked at, world units. In the paper's method the tolerance has no say.
 double detail_of(const TrackerOptions& options, const Surface& surface) {
     if (options.method == Method::Paper) return surface.resolution();
@@ -278,8 +285,8 @@ bool Tracker::Impl::has_flat_faces(const FrameWork& work) const {
         return widest_seed(sowing, work.surface, *work.crossings, work.limits);
     };
     const double wider = widest(kSparseSeedsFitted) / widest(kSparseSeeds),
-                 without = 1.0 - share_with_error(last_mesh.evidence, work.limits);
-    return without * std::pow(wider, kFewerByWidth) > 1.0 - kFewWithError;
+                 without_error = 1.0 - share_with_error(last_mesh.evidence, work.limits);
+    return without_error * std::pow(wider, kFewerByWidth) > 1.0 - kFewWithError;
 }
 
 /// Rounds of: mesh, measure, follow.
@@ -387,7 +394,6 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     const Surface& surface = work.surface;
     const SizingLimits& l = work.limits;
     TrackedFrame& frame = work.frame;
-    const Sowing sowing = options.method == Method::Paper ? kDenseSeeds : kSparseSeeds;
     // Beside the carry, as a registration is in part the work of one thread.
     Beside finding([&] { work.crossings.emplace(surface, kCrossingsApart * detail_of(options, surface)); });
     const auto crossings = [&]() -> const CrossingGrid& {
@@ -407,9 +413,11 @@ void Tracker::Impl::place_particles(const Motion& motion, FrameWork& work) {
     {
         const StageTimer timer(frame.seconds, "cover");
         work.inspector.emplace(surface, l, crossings());
-        if (warm) frame.seeded = cover(particles, surface, crossings(), l, options.seed, next_id, sowing);
+        if (warm)
+            frame.seeded =
+                cover(particles, surface, crossings(), l, options.seed, next_id, sowing_of(options, warm));
     }
-    if (!warm) seed(work, options.fit && options.method != Method::Paper ? kSparseSeedsFitted : sowing);
+    if (!warm) seed(work, sowing_of(options, warm));
     work.follows =
         warm && static_cast<double>(frame.seeded) < kMostSeeded * static_cast<double>(particles.size());
     if (options.method == Method::Paper)
