@@ -15,18 +15,18 @@ namespace isotrack {
 
 namespace {
 
-constexpr std::size_t kUsual = 7;  // of a mesh: six on average
+constexpr std::size_t kRoomAlongMesh = 7;  // six on average
 
 /// `list(i, found)`, called by several threads, appends the neighbours of i to the end of `found`, ascending.
-/// `usual`: how many there are of most at most.
+/// `room_each`: entries to make room for per particle, from the start; 0 where most may have none.
 template <typename List>
-Adjacency from_lists(std::size_t count, std::size_t usual, const List& list) {
+Adjacency from_lists(std::size_t count, std::size_t room_each, const List& list) {
     constexpr std::size_t kBlock = 256;  // lists are long, and what a thread holds of them it keeps
     Adjacency result;
     result.first.resize(count + 1);
     result.adjacent =
         find_in_blocks<int>(count, kBlock, [&](std::size_t begin, std::size_t end, std::vector<int>& found) {
-            found.reserve(usual * (end - begin));
+            found.reserve(room_each * (end - begin));
             for (std::size_t i = begin; i < end; ++i) {
                 const std::size_t before = found.size();
                 list(i, found);
@@ -45,7 +45,7 @@ Adjacency Adjacency::restricted(const std::vector<char>& keep) const {
     kept.reserve(size());
     for (std::size_t i = 0; i < size(); ++i)
         if (keep[i]) kept.push_back(static_cast<int>(i));
-    return from_lists(kept.size(), kUsual, [&](std::size_t n, std::vector<int>& found) {
+    return from_lists(kept.size(), kRoomAlongMesh, [&](std::size_t n, std::vector<int>& found) {
         const int i = kept[n];
         const std::size_t start = found.size();
         bool bridged = false;
@@ -140,7 +140,7 @@ Adjacency Adjacency::extended(const std::vector<std::array<int, 3>>& newborn, st
     for (std::size_t k = 0; k < newborn.size(); ++k)
         for (const int j : newborn[k]) links.emplace_back(j, static_cast<int>(size() + k));
     const Adjacency added = from_pairs(links, size());
-    return from_lists(count, kUsual, [&](std::size_t i, std::vector<int>& found) {
+    return from_lists(count, kRoomAlongMesh, [&](std::size_t i, std::vector<int>& found) {
         const auto append = [&](const auto& some) { found.insert(found.end(), some.begin(), some.end()); };
         if (i < size()) {
             append(of(i));
@@ -200,9 +200,10 @@ std::vector<std::vector<ParticleBlock>> colour_groups(const Adjacency& adjacency
         const auto free = std::find(taken.begin(), taken.end(), 0) - taken.begin();
         if (free == static_cast<std::ptrdiff_t>(groups.size())) groups.emplace_back();
         std::fill(colour.begin() + block.begin, colour.begin() + block.end, static_cast<int>(free));
-        bool any = some.empty();
-        for (int i = block.begin; i < block.end && !any; ++i) any = some[i] != 0;
-        if (any) groups[free].push_back(block);
+        // What is left out has its colour all the same: in which order the others go does not depend on it.
+        if (some.empty() || std::any_of(some.begin() + block.begin, some.begin() + block.end,
+                                        [](char flag) { return flag != 0; }))
+            groups[free].push_back(block);
     }
     return groups;
 }

@@ -39,8 +39,7 @@ CoordinateDescentReport coordinate_descent(Particles& particles, MovingNeighbour
     std::mt19937_64 random(options.seed);
     std::vector<char> alive(particles.size(), 1), queued(particles.size(), 1);
     std::vector<double> lambda(particles.size(), 0.1);
-    std::vector<Metric> metrics;
-    for (std::size_t i = 0; i < particles.size(); ++i) metrics.push_back(metric_of(particles, i));
+    std::vector<Metric> metrics = metrics_of(particles);
     std::deque<int> candidates;
     for (std::size_t i = 0; i < particles.size(); ++i) candidates.push_back(static_cast<int>(i));
     const auto push = [&](int i) {

@@ -25,7 +25,7 @@ int relax(Particles& particles, const Adjacency& adjacency, const Surface& surfa
     std::vector<double> lambda(particles.size(), 0.1);
     std::vector<char> active = restless;
     if (active.empty()) active.assign(particles.size(), 1);
-    std::vector<char> moved = active;
+    std::vector<char> moved = active;  // in the last sweep; those that rest are in no group or stay
     std::vector<Crease> crease(particles.size());
     int done = 0;
     const auto step = [&](int i, Surface::Probe& probe) {

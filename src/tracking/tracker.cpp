@@ -65,8 +65,8 @@ void round_to_float(Particles& particles) {
     for (Vec3& p : particles.position) p = to_float_precision(p);
 }
 
-/// Of the paper's sampling no certify makes more; the rest is sparse, and wider before the first mesh of a
-/// fit.
+/// Dense for the paper's sampling, which no certify adds to; otherwise sparse, and wider for the first seeds
+/// of a fit.
 Sowing sowing_of(const TrackerOptions& options, bool warm) {
     if (options.method == Method::Paper) return kDenseSeeds;
     return options.fit && !warm ? kSparseSeedsFitted : kSparseSeeds;

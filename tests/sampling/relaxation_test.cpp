@@ -45,7 +45,7 @@ TEST(ColourGroups, HoldEveryParticleOnceAndNoNeighboursInTwoBlocks) {
     }
 }
 
-TEST(ColourGroups, HaveLongBlocksWhereNeighboursFollowEachOtherAndNoneWithoutAnyOfSome) {
+TEST(ColourGroups, HaveLongBlocksWhereNeighboursFollowEachOther) {
     std::vector<std::pair<int, int>> pairs;  // two chains
     for (const auto& [from, to] : {std::pair(0, 30), std::pair(30, 50)})
         for (int i = from; i + 1 < to; ++i) {
@@ -60,14 +60,27 @@ TEST(ColourGroups, HaveLongBlocksWhereNeighboursFollowEachOtherAndNoneWithoutAny
         return block.begin == begin && block.end == end;
     };
     EXPECT_TRUE(spans(groups[0][0], 0, 20) && spans(groups[1][0], 20, 30) && spans(groups[0][1], 30, 50));
+}
 
-    std::vector<char> some(50, 0);
-    some[7] = some[29] = 1;
-    const auto of_some = colour_groups(from_pairs(pairs, 50), 20, some);
-    ASSERT_EQ(of_some.size(), 2u);
-    ASSERT_EQ(of_some[0].size(), 1u);  // without the other chain
-    ASSERT_EQ(of_some[1].size(), 1u);
-    EXPECT_TRUE(spans(of_some[0][0], 0, 20) && spans(of_some[1][0], 20, 30));
+TEST(ColourGroups, LeaveOutBlocksInWhichNoFlagIsSet) {
+    const Particles particles = random_on_unit_sphere(500, 0.15);
+    const Adjacency adjacency = adjacency_of(particles);
+    std::vector<char> some(particles.size(), 0);
+    some[7] = some[290] = some[291] = 1;
+    const auto all = colour_groups(adjacency, 3), of_some = colour_groups(adjacency, 3, some);
+    ASSERT_EQ(of_some.size(), all.size());
+    std::size_t left_out = 0;
+    for (std::size_t g = 0; g < all.size(); ++g) {
+        std::vector<int> expected, begins;
+        for (const ParticleBlock& block : all[g])
+            if (std::find(some.begin() + block.begin, some.begin() + block.end, 1) !=
+                some.begin() + block.end)
+                expected.push_back(block.begin);
+        for (const ParticleBlock& block : of_some[g]) begins.push_back(block.begin);
+        EXPECT_EQ(begins, expected);
+        left_out += all[g].size() - expected.size();
+    }
+    EXPECT_GT(left_out, 100u);
 }
 
 TEST(Relax, SpreadsRandomPointsAndKeepsThemOnTheSurface) {
@@ -169,6 +182,9 @@ TEST(Relax, GivesTheSameBitsAtAnyThreadCount) {
             Id next_id = 0;
             cover(particles, *surface, CrossingGrid(*surface), limits_of(0.12), 1, next_id);
             for (int round = 0; round < 3; ++round) relax(particles, adjacency_of(particles), *surface, 4);
+            std::vector<char> restless;
+            for (const Vec3& p : particles.position) restless.push_back(p.x() > 0.1);
+            relax(particles, adjacency_of(particles).squared(restless), *surface, 4, restless);
             return particles;
         };
         const Particles one = run(1), two = run(2);
@@ -206,6 +222,8 @@ TEST(Relax, MovesThoseAloneThatAreRestless) {
         moved += particles.position[i] != before.position[i];
     }
     EXPECT_GT(moved, 50u);
+    EXPECT_EQ(relax(particles, adjacency_of(particles), *sphere, 50, std::vector<char>(particles.size(), 0)),
+              1);
 }
 
 }  // namespace

@@ -30,9 +30,10 @@ double widest_seed(const Sowing& sowing, const Surface& surface, const CrossingG
 /// Adds particles where the surface has none near, until every crossing of the surface's lattice is covered:
 /// within reach of a particle that faces the same way and in whose tangent plane it nearly lies. With no
 /// particles at all this is the cold start: each seed covers `sowing.apart` of its spacing, so that on
-/// smooth surface no two are much nearer, in an order shuffled by `seed`. None is wider than `widest_seed`,
-/// or on flat sheets than 10 tolerances, if that is more. `crossings`: of the surface. Returns how many were
-/// added; new ids count on from `next_id`.
+/// smooth surface no two are much nearer, in an order shuffled by `seed`. None has a larger spacing than
+/// `widest_seed`, or on flat sheets than 10 tolerances, if that is more; beside the sheet such a seed covers
+/// what one of `widest_seed` does. `crossings`: of the surface. Returns how many were added; new ids count on
+/// from `next_id`.
 std::size_t cover(Particles& particles, const Surface& surface, const CrossingGrid& crossings,
                   const SizingLimits& limits, std::uint64_t seed, Id& next_id,
                   const Sowing& sowing = kSparseSeeds);
