@@ -48,8 +48,8 @@ struct ParticleBlock {
 /// of a group can be treated at the same time. Particles that are next to each other in memory as in space
 /// make long blocks, whose neighbours are still in the caches. Greedy in the order of the particles: the same
 /// at any thread count. Blocks in which no particle's flag is set are left out of their group, which may be
-/// empty then; without flags none is. With the lists of `squared(some)` a
-/// particle may have a neighbour without a flag in another block of its group.
+/// empty then; without flags none is. With the lists of `squared(some)` a particle may have a neighbour
+/// without a flag in another block of its group.
 std::vector<std::vector<ParticleBlock>> colour_groups(const Adjacency& adjacency, int longest,
                                                       const std::vector<char>& some = {});
 
