@@ -178,32 +178,37 @@ Adjacency Adjacency::squared(const std::vector<char>& some) const {
 std::vector<std::vector<ParticleBlock>> colour_groups(const Adjacency& adjacency, int longest,
                                                       const std::vector<char>& some) {
     const int count = static_cast<int>(adjacency.size());
-    std::vector<ParticleBlock> blocks;
-    for (int i = 0; i < count; ++i) {
-        const Adjacency::Range near = adjacency.of(i);
-        const bool goes_on =
-            i > 0 && i - blocks.back().begin < longest &&
-            std::any_of(near.begin(), near.end(), [&](int j) { return j < i && j >= blocks.back().begin; });
-        if (goes_on)
-            blocks.back().end = i + 1;
-        else
-            blocks.push_back({i, i + 1});
-    }
-    std::vector<int> colour(adjacency.size(), -1);
-    std::vector<std::vector<ParticleBlock>> groups;
-    std::vector<char> taken;
-    for (const ParticleBlock& block : blocks) {
-        taken.assign(groups.size() + 1, 0);
+    const auto end_of_block = [&](int begin) {
+        int end = begin + 1;
+        for (; end < count && end - begin < longest; ++end) {
+            const Adjacency::Range near = adjacency.of(end);
+            if (std::none_of(near.begin(), near.end(), [&](int j) { return begin <= j && j < end; })) break;
+        }
+        return end;
+    };
+    if (count == 0) return {};
+    std::vector<int> colour(adjacency.size(), 0);
+    std::vector<std::vector<ParticleBlock>> groups(1);
+    std::vector<int> taken_at(1, -1);  // per group: the begin of the last block that has a neighbour in it
+    for (ParticleBlock block{0, 0}; block.begin < count; block.begin = block.end) {
+        block.end = end_of_block(block.begin);
+        const bool is_left_out =
+            !some.empty() && std::none_of(some.begin() + block.begin, some.begin() + block.end,
+                                          [](char flag) { return flag != 0; });
+        const bool has_no_list = adjacency.first[block.begin] == adjacency.first[block.end];
+        if (is_left_out && has_no_list) continue;  // most; its colour is 0, which it has
         for (int i = block.begin; i < block.end; ++i)
             for (const int j : adjacency.of(i))
-                if (colour[j] >= 0) taken[colour[j]] = 1;
-        const auto free = std::find(taken.begin(), taken.end(), 0) - taken.begin();
-        if (free == static_cast<std::ptrdiff_t>(groups.size())) groups.emplace_back();
-        std::fill(colour.begin() + block.begin, colour.begin() + block.end, static_cast<int>(free));
+                if (j < block.begin) taken_at[colour[j]] = block.begin;
+        std::size_t free = 0;
+        while (free < groups.size() && taken_at[free] == block.begin) ++free;
+        if (free == groups.size()) {
+            groups.emplace_back();
+            taken_at.push_back(-1);
+        }
         // What is left out has its colour all the same: in which order the others go does not depend on it.
-        if (some.empty() || std::any_of(some.begin() + block.begin, some.begin() + block.end,
-                                        [](char flag) { return flag != 0; }))
-            groups[free].push_back(block);
+        std::fill(colour.begin() + block.begin, colour.begin() + block.end, static_cast<int>(free));
+        if (!is_left_out) groups[free].push_back(block);
     }
     return groups;
 }

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -52,7 +53,8 @@ TEST(ColourGroups, HaveLongBlocksWhereNeighboursFollowEachOther) {
             pairs.emplace_back(i, i + 1);
             pairs.emplace_back(i + 1, i);
         }
-    const auto groups = colour_groups(from_pairs(pairs, 50), 20);
+    const Adjacency chains = from_pairs(pairs, 50);
+    const auto groups = colour_groups(chains, 20);
     ASSERT_EQ(groups.size(), 2u);  // the two blocks of a chain differ
     ASSERT_EQ(groups[0].size(), 2u);
     ASSERT_EQ(groups[1].size(), 1u);
@@ -60,6 +62,20 @@ TEST(ColourGroups, HaveLongBlocksWhereNeighboursFollowEachOther) {
         return block.begin == begin && block.end == end;
     };
     EXPECT_TRUE(spans(groups[0][0], 0, 20) && spans(groups[1][0], 20, 30) && spans(groups[0][1], 30, 50));
+    const auto whole = colour_groups(chains, std::numeric_limits<int>::max());
+    ASSERT_EQ(whole.size(), 1u);
+    ASSERT_EQ(whole[0].size(), 2u);
+    EXPECT_TRUE(spans(whole[0][0], 0, 30) && spans(whole[0][1], 30, 50));
+}
+
+TEST(ColourGroups, GiveWhoIsLeftOutAColourAllTheSame) {
+    // The neighbours of the two that move have no lists.
+    const auto groups = colour_groups(from_pairs({{1, 0}, {3, 2}}, 4), 1, {0, 1, 0, 1});
+    ASSERT_EQ(groups.size(), 2u);
+    EXPECT_TRUE(groups[0].empty());
+    ASSERT_EQ(groups[1].size(), 2u);
+    EXPECT_EQ(groups[1][0].begin, 1);
+    EXPECT_EQ(groups[1][1].begin, 3);
 }
 
 TEST(ColourGroups, LeaveOutBlocksInWhichNoFlagIsSet) {
