@@ -80,17 +80,19 @@ Survey survey(const Vec3& a, const Vec3& b, const Vec3& c, Surface::Probe& probe
     TriangleError& error = result.error;
     Sample outside, inside;  // the farthest on either side
     const double along = steps / (c - a).norm(), across = steps / (b - a).norm();
-    thread_local std::vector<double> values;  // there are many triangles
-    values.clear();
+    thread_local std::vector<Vec3> places;  // there are many triangles
+    thread_local std::vector<double> values;
+    places.clear();
     const auto for_each_point = [steps](const auto& visit) {
         for (int i = 0; i <= steps; ++i)
             for (int j = 0; i + j <= steps; ++j)
                 visit(i, j, static_cast<double>(i) / steps, static_cast<double>(j) / steps);
     };
-    // All are read first: a branch on the largest would make the processor wait for each that is in no cache.
-    for_each_point([&](int, int, double u, double v) {
-        values.push_back(probe.farther_value(a + u * (b - a) + v * (c - a)));
-    });
+    // All are read first, by one call, so that a grid can fetch them together. A branch on the largest would
+    // make the processor wait for each that is in no cache.
+    for_each_point([&](int, int, double u, double v) { places.push_back(a + u * (b - a) + v * (c - a)); });
+    values.resize(places.size());
+    probe.farther_values(places.data(), places.size(), values.data());
     const double* next = values.data();
     for_each_point([&](int i, int j, double u, double v) {
         const double* const here = next++;

@@ -21,6 +21,11 @@ double GridProbe::farther_value(const Vec3& p) {
     return std::abs(value) < kInBand * band_ ? value : beyond_band(p, value);
 }
 
+void GridProbe::farther_values(const Vec3* points, std::size_t count, double* values) {
+    for (std::size_t i = 0; i < count; ++i) stencil_.prefetch(map_.to_index(points[i]));
+    for (std::size_t i = 0; i < count; ++i) values[i] = farther_value(points[i]);
+}
+
 Surface::Sample GridProbe::sample(const Vec3& p) {
     Surface::Sample s = stencil_.sample(map_.to_index(p));
     s.gradient = map_.gradient_to_world(s.gradient);

@@ -17,6 +17,7 @@ public:
 
     double value(const Vec3& p) override { return stencil_.value(map_.to_index(p)).joined; }
     double farther_value(const Vec3& p) override;
+    void farther_values(const Vec3* points, std::size_t count, double* values) override;
     Surface::Sample sample(const Vec3& p) override;
     CellValues cell_values(const Vec3& low, const Eigen::Affine3d& lattice) override;
 

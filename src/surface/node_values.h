@@ -64,6 +64,14 @@ public:
         }
     }
 
+    /// Brings the nodes of a cell, from `low` on, towards the caches: those in the leaf of `low`.
+    void prefetch(const Coord& low) {
+        const int x = low.x() & kMask, y = low.y() & kMask, z = low.z() & kMask;
+        const float* values = place_of(low).values;
+        for (const int i : {x, std::min(x + 1, kMask)})
+            for (const int j : {y, std::min(y + 1, kMask)}) __builtin_prefetch(values + offset(i, j) + z);
+    }
+
 private:
     struct Place {
         const float* values = nullptr;

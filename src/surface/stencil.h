@@ -34,6 +34,12 @@ public:
         return {joined, is_farther(trilinear, joined) ? trilinear : joined};
     }
 
+    /// Brings most of what `value` reads there towards the caches.
+    void prefetch(const Vec3& index) {
+        Vec3 t;
+        nodes_.prefetch(split(index, t));
+    }
+
     /// The values at a cell's corners.
     void corners(const Vec3& low, float (&v)[2][2][2]) {
         Vec3 t;

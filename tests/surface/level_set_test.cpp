@@ -150,6 +150,22 @@ TEST(LevelSet, KnowsDistancesALittleBeyondItsBand) {
     EXPECT_LT(sum / static_cast<double>(beyond), 0.1 * h);
 }
 
+TEST(LevelSet, HasTheSameFartherValuesAtManyPointsAtOnce) {
+    // Through more leaves than a probe keeps at hand, in and far beyond the band, in tiles and outside.
+    const LevelSet level_set(sphere_grid<openvdb::FloatGrid>(uniform(0.02), 0.06));
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> coordinate(-1.3, 1.3);
+    std::vector<Vec3> points = near_sphere(1000, 0.1);
+    for (int n = 0; n < 1000; ++n)
+        points.emplace_back(coordinate(random), coordinate(random), coordinate(random));
+    points.emplace_back(1e300, 0.0, 0.0);
+    std::vector<double> at_once(points.size());
+    level_set.probe()->farther_values(points.data(), points.size(), at_once.data());
+    const auto probe = level_set.probe();
+    for (std::size_t n = 0; n < points.size(); ++n)
+        EXPECT_EQ(at_once[n], probe->farther_value(points[n])) << points[n].transpose();
+}
+
 TEST(LevelSet, AgreesWithOpenVdbsTrilinearSampler) {
     const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
         1.0f, openvdb::Vec3f(0.3f, -0.2f, 0.1f), 0.05f, 4.0f);

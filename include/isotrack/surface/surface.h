@@ -42,6 +42,11 @@ public:
         /// be read in more than one way: what meshes are held to. Right in size below `Surface::reach()`, and
         /// no less than that beyond.
         virtual double farther_value(const Vec3& p) { return value(p); }
+        /// The same at `count` points, into as many `values`: takes less time than one after the other where
+        /// a grid is too large for the caches.
+        virtual void farther_values(const Vec3* points, std::size_t count, double* values) {
+            for (std::size_t i = 0; i < count; ++i) values[i] = farther_value(points[i]);
+        }
 
         /// Value and gradient together, for less than the price of both.
         virtual Sample sample(const Vec3& p) = 0;
