@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "isotrack/sampling/particles.h"
@@ -40,6 +41,14 @@ inline std::vector<Metric> metrics_of(const Particles& particles) {
     std::vector<Metric> result(particles.size());
     parallel_for_each(result.size(), kGrain, [&](std::size_t i) { result[i] = metric_of(particles, i); });
     return result;
+}
+
+/// The squared length of the edge between two particles, in the mean of their metrics; infinite where they
+/// face away from each other.
+inline double square_between(const Particles& particles, const std::vector<Metric>& metrics, int i, int j) {
+    if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) return std::numeric_limits<double>::infinity();
+    const Vec3 r = particles.position[j] - particles.position[i];
+    return 0.5 * (metrics[i].square(r) + metrics[j].square(r));
 }
 
 }  // namespace isotrack

@@ -43,13 +43,10 @@ std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacen
                             const PopulationBand& band) {
     const std::vector<Metric> metrics = metrics_of(particles);
     const auto nearest_square = [&](std::size_t i) {
-        double q = 1e300;
-        for (const int j : adjacency.of(i)) {
-            if (!(particles.normal[i].dot(particles.normal[j]) > 0.0)) continue;
-            const Vec3 r = particles.position[j] - particles.position[i];
-            q = std::min(q, 0.5 * (metrics[i].square(r) + metrics[j].square(r)));
-        }
-        return q;
+        double least = std::numeric_limits<double>::infinity();
+        for (const int j : adjacency.of(i))
+            least = std::min(least, square_between(particles, metrics, static_cast<int>(i), j));
+        return least;
     };
     const auto crowded = smallest_first(particles.size(), nearest_square, band.crowded * band.crowded);
     std::vector<char> keep(particles.size(), 1);

@@ -1,12 +1,15 @@
 #include "tracking/thinning.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <queue>
 #include <utility>
 
@@ -74,28 +77,24 @@ class Thinning {
     static constexpr std::size_t kMostlyEnough = 8;  // triangles around a particle
 
 public:
-    Thinning(const Particles& particles, std::vector<Triangle>& triangles, const Surface& surface,
-             const CrossingGrid& crossings, const ThinningLimits& limits)
+    Thinning(const Particles& particles, std::vector<Triangle>& triangles, const Adjacency& ring,
+             const Surface& surface, const CrossingGrid& crossings, const ThinningLimits& limits)
         : particles_(particles),
           triangles_(triangles),
+          ring_(ring),
           surface_(surface),
           crossings_(crossings),
           limits_(limits),
           metrics_(metrics_of(particles)),
-          corners_(particles.size(), triangles),
           fan_(particles.size()),
           keep_(particles.size(), 1),
           gone_(triangles.size(), 0),
           changed_(particles.size(), 0) {}
 
     std::vector<char> run() {
-        using Candidate = std::pair<double, int>;  // squared distance to the nearest, particle
-        std::vector<Candidate> crowded = find_in_blocks<Candidate>(
-            particles_.size(), 1024, [&](std::size_t begin, std::size_t end, std::vector<Candidate>& found) {
-                for (std::size_t i = begin; i < end; ++i)
-                    if (const double q = nearest_square(static_cast<int>(i)); is_crowded(q))
-                        found.emplace_back(q, static_cast<int>(i));
-            });
+        std::vector<Candidate> crowded;
+        tbb::parallel_invoke([&] { corners_.emplace(particles_.size(), triangles_); },
+                             [&] { crowded = find_crowded(); });
         // Most may not go; what nobody has gone beside is known from the start.
         ThreadProbes probes(surface_);
         std::vector<std::vector<Triangle>> at_first(crowded.size());
@@ -105,20 +104,22 @@ public:
         });
         std::vector<int> number(particles_.size(), -1);
         for (std::size_t k = 0; k < crowded.size(); ++k) number[crowded[k].second] = static_cast<int>(k);
-        std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> queue(std::greater<>(),
-                                                                                     std::move(crowded));
-        while (!queue.empty()) {
-            const auto [q, i] = queue.top();
-            queue.pop();
+        tbb::parallel_sort(crowded.begin(), crowded.end());
+        std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> again;
+        for (auto next = crowded.begin(); next != crowded.end() || !again.empty();) {
+            const bool is_first_time = again.empty() || (next != crowded.end() && *next < again.top());
+            const auto [q, i] = is_first_time ? *next++ : again.top();
+            if (!is_first_time) again.pop();
             const double now = changed_[i] ? nearest_square(i) : q;
             if (now != q) {  // a neighbour has gone
-                if (is_crowded(now)) queue.emplace(now, i);
+                if (is_crowded(now)) again.emplace(now, i);
                 continue;
             }
             const auto closing = changed_[i] ? closing_of(i, probes.local()) : std::move(at_first[number[i]]);
             if (!closing.empty() && fits(closing, i)) take_out(i, closing);
         }
         std::vector<Triangle> rest;
+        rest.reserve(triangles_.size());
         for (std::size_t t = 0; t < triangles_.size(); ++t)
             if (!gone_[t]) rest.push_back(triangles_[t]);
         triangles_ = std::move(rest);
@@ -126,6 +127,21 @@ public:
     }
 
 private:
+    using Candidate = std::pair<double, int>;  // squared distance to the nearest, particle
+
+    std::vector<Candidate> find_crowded() const {
+        constexpr std::size_t kBlock = 1024;
+        return find_in_blocks<Candidate>(
+            particles_.size(), kBlock,
+            [&](std::size_t begin, std::size_t end, std::vector<Candidate>& found) {
+                for (std::size_t n = begin; n < end; ++n) {
+                    const int i = static_cast<int>(n);
+                    double least = kInfinite;
+                    for (const int j : ring_.of(n)) least = std::min(least, square_to(i, j));
+                    if (is_crowded(least)) found.emplace_back(least, i);
+                }
+            });
+    }
     bool is_crowded(double nearest_square) const {
         return nearest_square < limits_.crowded * limits_.crowded;
     }
@@ -134,8 +150,8 @@ private:
     template <typename Visit>
     bool any_around(int i, const Visit& visit) const {
         if (changed_[i]) return std::any_of(fan_[i].begin(), fan_[i].end(), visit);
-        for (int e = corners_.first[i]; e < corners_.first[i + 1]; ++e)
-            if (visit(corners_.corner[e] / 3)) return true;
+        for (int e = corners_->first[i]; e < corners_->first[i + 1]; ++e)
+            if (visit(corners_->corner[e] / 3)) return true;
         return false;
     }
     template <typename Visit>
@@ -154,14 +170,13 @@ private:
         changed_[i] = 1;
         return fan_[i];
     }
+    double square_to(int i, int j) const { return square_between(particles_, metrics_, i, j); }
+    /// By the triangles as they are now.
     double nearest_square(int i) const {
         double least = kInfinite;
         for_each_around(i, [&](int t) {
-            for (const int j : triangles_[t]) {
-                if (j == i || !(particles_.normal[i].dot(particles_.normal[j]) > 0.0)) continue;
-                const Vec3 r = particles_.position[j] - particles_.position[i];
-                least = std::min(least, 0.5 * (metrics_[i].square(r) + metrics_[j].square(r)));
-            }
+            for (const int j : triangles_[t])
+                if (j != i) least = std::min(least, square_to(i, j));
         });
         return least;
     }
@@ -279,11 +294,12 @@ private:
 
     const Particles& particles_;
     std::vector<Triangle>& triangles_;
+    const Adjacency& ring_;
     const Surface& surface_;
     const CrossingGrid& crossings_;
     const ThinningLimits limits_;
     const std::vector<Metric> metrics_;
-    const Corners corners_;              // of the start
+    std::optional<Corners> corners_;     // of the start, made by `run`
     std::vector<std::vector<int>> fan_;  // the triangles of those that changed since
     std::vector<char> keep_;             // particles
     std::vector<char> gone_;             // triangles
@@ -292,9 +308,9 @@ private:
 
 }  // namespace
 
-std::vector<char> thin(const Particles& particles, std::vector<Triangle>& triangles, const Surface& surface,
-                       const CrossingGrid& crossings, const ThinningLimits& limits) {
-    return Thinning(particles, triangles, surface, crossings, limits).run();
+std::vector<char> thin(const Particles& particles, std::vector<Triangle>& triangles, const Adjacency& ring,
+                       const Surface& surface, const CrossingGrid& crossings, const ThinningLimits& limits) {
+    return Thinning(particles, triangles, ring, surface, crossings, limits).run();
 }
 
 }  // namespace isotrack

@@ -334,7 +334,7 @@ void Tracker::Impl::follow(FrameWork& work, const Pace& pace, bool warm) {
     if (warm) {
         return_to_creases(particles, last_mesh.ring, surface);
         const double enough = (options.fit ? kUnfitted : 1.0) * l.tolerance;
-        keep = thin(particles, last_mesh.triangles, surface, *work.crossings,
+        keep = thin(particles, last_mesh.triangles, last_mesh.ring, surface, *work.crossings,
                     {pace.band.crowded, kThinned * enough, kCertified * enough, l.detail});
     } else {
         keep = uncrowded(particles, last_mesh.ring, pace.band);

@@ -41,11 +41,31 @@ struct Dense {
     }
 };
 
+/// By the ring of the triangles.
+std::vector<char> thinned(const Particles& particles, std::vector<Triangle>& triangles,
+                          const Surface& surface, const CrossingGrid& crossings,
+                          const ThinningLimits& limits) {
+    const Adjacency ring = ring_of(triangles, particles.size());
+    return thin(particles, triangles, ring, surface, crossings, limits);
+}
+
 double least_angle(const Vec3& a, const Vec3& b, const Vec3& c) {
     const auto at = [](const Vec3& p, const Vec3& q, const Vec3& r) {
         return std::acos((q - p).normalized().dot((r - p).normalized())) * 180.0 / 3.14159265358979;
     };
     return std::min({at(a, b, c), at(b, c, a), at(c, a, b)});
+}
+
+TEST(Thinning, DoesNotMindNeighboursBeyondTheRing) {
+    Dense one, other;
+    const Adjacency ring = ring_of(one.triangles, one.particles.size());
+    const auto sphere = unit_sphere();
+    const CrossingGrid crossings(*sphere);
+    const ThinningLimits limits{0.7, kError, kError, kDetail};
+    const auto keep = thin(one.particles, one.triangles, ring, *sphere, crossings, limits);
+    EXPECT_NE(std::count(keep.begin(), keep.end(), 0), 0);
+    EXPECT_EQ(thin(other.particles, other.triangles, ring.squared(), *sphere, crossings, limits), keep);
+    EXPECT_EQ(other.triangles, one.triangles);
 }
 
 TEST(Thinning, LeavesAClosedMeshWithinTheErrorWithoutSharpTriangles) {
@@ -57,8 +77,8 @@ TEST(Thinning, LeavesAClosedMeshWithinTheErrorWithoutSharpTriangles) {
         sharpest = std::min(sharpest, least_angle(dense.particles.position[a], dense.particles.position[b],
                                                   dense.particles.position[c]));
     const auto sphere = unit_sphere();
-    const auto keep = thin(dense.particles, dense.triangles, *sphere, CrossingGrid(*sphere),
-                           {0.7, kError, kError, kDetail});
+    const auto keep = thinned(dense.particles, dense.triangles, *sphere, CrossingGrid(*sphere),
+                              {0.7, kError, kError, kDetail});
     ASSERT_EQ(keep.size(), dense.particles.size());
     const auto kept = static_cast<std::size_t>(std::count(keep.begin(), keep.end(), 1));
     EXPECT_LT(kept, 2000u);
@@ -82,8 +102,8 @@ TEST(Thinning, TakesNobodyWhoIsNotCrowded) {
     Dense dense;
     std::fill(dense.particles.spacing.begin(), dense.particles.spacing.end(), 0.04);
     const auto triangles = dense.triangles;
-    const auto keep = thin(dense.particles, dense.triangles, *unit_sphere(), CrossingGrid(*unit_sphere()),
-                           {0.7, kError, kError, kDetail});
+    const auto keep = thinned(dense.particles, dense.triangles, *unit_sphere(), CrossingGrid(*unit_sphere()),
+                              {0.7, kError, kError, kDetail});
     EXPECT_EQ(std::count(keep.begin(), keep.end(), 0), 0);
     EXPECT_EQ(dense.triangles, triangles);
 }
@@ -92,8 +112,8 @@ TEST(Thinning, KeepsWhoeverTheErrorNeeds) {
     Dense dense;
     const auto count_at = [&](double error) {
         std::vector<Triangle> triangles = dense.triangles;
-        const auto keep = thin(dense.particles, triangles, *unit_sphere(), CrossingGrid(*unit_sphere()),
-                               {1.0, error, error, kDetail});
+        const auto keep = thinned(dense.particles, triangles, *unit_sphere(), CrossingGrid(*unit_sphere()),
+                                  {1.0, error, error, kDetail});
         return std::count(keep.begin(), keep.end(), 1);
     };
     EXPECT_EQ(count_at(1e-5), 3000);
@@ -130,7 +150,7 @@ TEST(Thinning, KeepsTheCornersAndEdgesOfABox) {
                         triangles.insert(triangles.end(), {{a, c, b}, {a, d, c}});
                 }
     const auto box = shapes::box({0, 0, 0}, {1, 1, 1}, 0.1);
-    const auto keep = thin(particles, triangles, *box, CrossingGrid(*box), {0.7, 0.02, 0.02, 0.1});
+    const auto keep = thinned(particles, triangles, *box, CrossingGrid(*box), {0.7, 0.02, 0.02, 0.1});
     EXPECT_LT(std::count(keep.begin(), keep.end(), 1), static_cast<long>(3 * particles.size() / 4));
     for (std::size_t i = 0; i < particles.size(); ++i)
         if (particles.position[i].cwiseAbs().minCoeff() > 0.999) {
@@ -156,8 +176,8 @@ TEST(Thinning, LeavesTheRimOfAnOpenMeshAndTheSmallestBodies) {
         if (!gone) open.push_back(t);
         for (const int v : t) at_rim[v] = at_rim[v] || gone;
     }
-    const auto keep = thin(dense.particles, open, *unit_sphere(), CrossingGrid(*unit_sphere()),
-                           {0.7, kError, kError, kDetail});
+    const auto keep = thinned(dense.particles, open, *unit_sphere(), CrossingGrid(*unit_sphere()),
+                              {0.7, kError, kError, kDetail});
     EXPECT_LT(std::count(keep.begin(), keep.end(), 1), 2500);
     for (std::size_t i = 0; i < keep.size(); ++i) EXPECT_TRUE(keep[i] || !at_rim[i]);
 
@@ -168,7 +188,7 @@ TEST(Thinning, LeavesTheRimOfAnOpenMeshAndTheSmallestBodies) {
                     static_cast<Id>(corners.size()));
     std::vector<Triangle> tetrahedron{{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}};
     const auto plate = shapes::plate({0, 0, -0.1}, 1.0, 0.2, 0.1);
-    const auto all = thin(corners, tetrahedron, *plate, CrossingGrid(*plate), {1.0, 1.0, 1.0, 0.1});
+    const auto all = thinned(corners, tetrahedron, *plate, CrossingGrid(*plate), {1.0, 1.0, 1.0, 0.1});
     EXPECT_EQ(std::count(all.begin(), all.end(), 1), 4);
 }
 
