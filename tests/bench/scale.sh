@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Prints what a warm frame costs as the grid grows, with one thread and two, and as the mesh grows, and below each table the wanted
 # figures that are missed. The surface is a sphere with bumps that travel; a warm frame is the mean of the last two of four in
-# the first table, of the last six of eight in the others.
+# the first table, of the last six of eight in the others. Threads are compared by the medians of three runs.
 # usage: scale.sh PROGRAM_DIR [--large] [VOXELS_PER_DIAGONAL...]
 #        scale.sh PROGRAM_DIR --long
 # PROGRAM_DIR holds isotrack_scale. --large adds the row of 500 000 particles. Without VOXELS_PER_DIAGONAL: 256 512 1024 2048.
@@ -48,6 +48,27 @@ evaluate() {
         NR == 2 { for (i = 1; i <= NF; i++) value[name[i]] = $i }
         NR == 3 { for (i = 1; i <= NF; i++) second[name[i]] = $i }
         '"$program_text" "$work/row.csv"
+}
+# medians ROW_CSV...: of an odd number of files with the same names, as such a file.
+medians() {
+    LC_ALL=C awk -F, '
+        FNR == 1 { if (NR == 1) print; next }
+        { ++rows; for (i = 1; i <= NF; i++) value[i, rows] = $i + 0 }
+        END {
+            for (i = 1; i <= NF; i++)
+                for (row = 1; row <= rows; row++) {
+                    below = same = 0
+                    for (other = 1; other <= rows; other++) {
+                        below += (value[i, other] < value[i, row])
+                        same += (value[i, other] == value[i, row])
+                    }
+                    if (below <= (rows - 1) / 2 && below + same > (rows - 1) / 2) {
+                        printf "%s%.9g", (i > 1 ? "," : ""), value[i, row]
+                        break
+                    }
+                }
+            print ""
+        }' "$@"
 }
 print_missed() {
     if [ -s "$work/missed" ]; then
@@ -125,10 +146,14 @@ print_missed
 
 echo
 size_for 25000 --frames 8
-track_six --tolerance "$tolerance" --threads 1
-cp "$work/row.csv" "$work/one.csv"
-track_six --tolerance "$tolerance" --threads 2
-sed 1d "$work/one.csv" >>"$work/row.csv"
+for round in 1 2 3; do  # in turns, as the machine may be slower in some minutes
+    for threads in 1 2; do
+        track_six --tolerance "$tolerance" --threads "$threads"
+        cp "$work/row.csv" "$work/$threads.$round.csv"
+    done
+done
+medians "$work"/2.*.csv >"$work/row.csv"
+medians "$work"/1.*.csv | sed 1d >>"$work/row.csv"
 evaluate '
     function row(text, key,    times) {
         if (!(key in second) || !(value[key] > 0)) return
@@ -137,7 +162,7 @@ evaluate '
         miss((key == "relax" || key == "certify" || key == "both") && times < 1.6, sprintf("%s %.2f", text, times))
     }
     END {
-        printf "Threads, on %d particles; seconds.\n\n| stage | 1 thread | 2 threads | speed-up |\n|---|---:|---:|---:|\n", value["particles"]
+        printf "Threads, on %d particles; seconds, medians of three runs each.\n\n| stage | 1 thread | 2 threads | speed-up |\n|---|---:|---:|---:|\n", value["particles"]
         value["both"] = value["carry"] + value["cover"]; second["both"] = second["carry"] + second["cover"]
         row("open", "open")
         row("carry and cover", "both")
