@@ -9,6 +9,7 @@
 
 #include "find_in_blocks.h"
 #include "parallel_for_each.h"
+#include "sampling/crowded.h"
 #include "sampling/metric.h"
 #include "surface/float_precision.h"
 #include "surface/surface_near.h"
@@ -41,14 +42,8 @@ std::vector<std::pair<double, int>> smallest_first(std::size_t count, const Meas
 
 std::vector<char> uncrowded(const Particles& particles, const Adjacency& adjacency,
                             const PopulationBand& band) {
-    const std::vector<Metric> metrics = metrics_of(particles);
-    const auto nearest_square = [&](std::size_t i) {
-        double least = std::numeric_limits<double>::infinity();
-        for (const int j : adjacency.of(i))
-            least = std::min(least, square_between(particles, metrics, static_cast<int>(i), j));
-        return least;
-    };
-    const auto crowded = smallest_first(particles.size(), nearest_square, band.crowded * band.crowded);
+    auto crowded = find_crowded(particles, metrics_of(particles), adjacency, band.crowded);
+    std::sort(crowded.begin(), crowded.end());
     std::vector<char> keep(particles.size(), 1);
     for (const auto& [q, i] : crowded) {
         bool neighbour_went = false;

@@ -13,11 +13,11 @@
 #include <queue>
 #include <utility>
 
-#include "find_in_blocks.h"
 #include "isotrack/meshing/certify.h"
 #include "meshing/corners.h"
 #include "meshing/sharpness.h"
 #include "meshing/stands_for.h"
+#include "sampling/crowded.h"
 #include "sampling/metric.h"
 #include "surface/thread_probes.h"
 
@@ -94,7 +94,7 @@ public:
     std::vector<char> run() {
         std::vector<Candidate> crowded;
         tbb::parallel_invoke([&] { corners_.emplace(particles_.size(), triangles_); },
-                             [&] { crowded = find_crowded(); });
+                             [&] { crowded = find_crowded(particles_, metrics_, ring_, limits_.crowded); });
         // Most may not go; what nobody has gone beside is known from the start.
         ThreadProbes probes(surface_);
         std::vector<std::vector<Triangle>> at_first(crowded.size());
@@ -129,19 +129,6 @@ public:
 private:
     using Candidate = std::pair<double, int>;  // squared distance to the nearest, particle
 
-    std::vector<Candidate> find_crowded() const {
-        constexpr std::size_t kBlock = 1024;
-        return find_in_blocks<Candidate>(
-            particles_.size(), kBlock,
-            [&](std::size_t begin, std::size_t end, std::vector<Candidate>& found) {
-                for (std::size_t n = begin; n < end; ++n) {
-                    const int i = static_cast<int>(n);
-                    double least = kInfinite;
-                    for (const int j : ring_.of(n)) least = std::min(least, square_to(i, j));
-                    if (is_crowded(least)) found.emplace_back(least, i);
-                }
-            });
-    }
     bool is_crowded(double nearest_square) const {
         return nearest_square < limits_.crowded * limits_.crowded;
     }
@@ -170,13 +157,12 @@ private:
         changed_[i] = 1;
         return fan_[i];
     }
-    double square_to(int i, int j) const { return square_between(particles_, metrics_, i, j); }
     /// By the triangles as they are now.
     double nearest_square(int i) const {
         double least = kInfinite;
         for_each_around(i, [&](int t) {
             for (const int j : triangles_[t])
-                if (j != i) least = std::min(least, square_to(i, j));
+                if (j != i) least = std::min(least, square_between(particles_, metrics_, i, j));
         });
         return least;
     }
