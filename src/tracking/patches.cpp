@@ -30,6 +30,7 @@ namespace {
 constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr double kSmall = 3.5;    // reach of the pieces of the mesh that are looked at
 constexpr double kThin = 2.0;     // sheets no farther apart
+constexpr double kNarrow = 3.0;   // likewise: mesh and lattice may join them differently
 constexpr double kApart = 1.5;    // places that near are one
 constexpr double kCovered = 2.0;  // so far apart they leave nothing out
 constexpr double kAround = 2.5;   // the middles of other patches for what fails
@@ -108,7 +109,7 @@ double area_of(const std::vector<int>& triangles, const FrameMesh& mesh) {
 }
 
 /// Small handles anywhere, and where lattice nodes are joined across a face.
-std::vector<Vec3> other_places(const FrameMesh& mesh, const Surface& surface) {
+std::vector<Vec3> small_places(const FrameMesh& mesh, const Surface& surface) {
     const double resolution = surface.resolution();
     std::vector<Vec3> result;
     for (const int v : small_handles(mesh.vertices, mesh.carved.triangles,
@@ -116,6 +117,18 @@ std::vector<Vec3> other_places(const FrameMesh& mesh, const Surface& surface) {
         result.push_back(mesh.vertices[v]);
     for (const auto& diagonal : surface.diagonals()) result.push_back(0.5 * (diagonal.from + diagonal.to));
     return apart(result, kApart * resolution, kMostPlaces);
+}
+
+/// Where the next sheet is near; none if that is at more than `kMostPlaces`.
+std::vector<Vec3> narrow_places(const FrameMesh& mesh, const std::vector<double>& thickness,
+                                double resolution) {
+    std::vector<Vec3> result;
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+        if (const int p = mesh.carved.particle[v]; p >= 0 && thickness[p] < kNarrow * resolution)
+            result.push_back(mesh.vertices[v]);
+    result = apart(result, kApart * resolution, kMostPlaces + 1);
+    if (result.size() > kMostPlaces) result.clear();
+    return result;
 }
 
 /// Places all over a mesh that leave nothing of it out. None where there are too many, or where the triangles
@@ -433,20 +446,21 @@ std::size_t patch_topology(MeshTrials& trials, const std::vector<double>& thickn
     }
     if (now > kMostAstray) return count;
     share = 1.0;
-    if (now > 0 && !effort.is_enough() && !std::exchange(effort.anywhere, true)) {
-        // Where something small is, which takes a tenth of the time, then everywhere.
-        for (const bool everywhere : {false, true}) {
-            if (now == 0 || effort.is_enough()) break;
-            std::vector<Vec3> others = everywhere ? places_everywhere(trials.mesh(), resolution)
-                                                  : other_places(trials.mesh(), surface);
-            if (others.empty()) continue;
+    const auto goes_on = [&] { return now > 0 && !effort.is_enough(); };
+    if (goes_on() && !std::exchange(effort.anywhere, true)) {
+        const auto look_at = [&](std::vector<Vec3> others, bool or_unfit) {
+            if (others.empty()) return;
             make_lattice(others, kTriedReach);
             const auto middle =
                 others.begin() + static_cast<std::ptrdiff_t>(patcher->put_differing_first(others));
             const std::vector<Vec3> differing(others.begin(), middle), rest(middle, others.end());
             for (const auto* some : {&differing, &rest})
-                if (now > 0 && !effort.is_enough()) search(patcher->unlike(*some, !everywhere), true);
-        }
+                if (goes_on()) search(patcher->unlike(*some, or_unfit), true);
+        };
+        // Each of the first two takes a tenth of the time of the last.
+        look_at(small_places(trials.mesh(), surface), true);
+        if (goes_on()) look_at(narrow_places(trials.mesh(), thickness, resolution), true);
+        if (goes_on()) look_at(places_everywhere(trials.mesh(), resolution), false);
         all_have_lattice = false;
     }
     search(places, all_have_lattice);
