@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <tuple>
@@ -11,6 +12,7 @@
 #include "disjoint_sets.h"
 #include "meshing/contested_nodes.h"
 #include "meshing/lattice_neighbours.h"
+#include "parallel_for_each.h"
 #include "surface/thread_probes.h"
 
 namespace isotrack {
@@ -33,7 +35,7 @@ std::vector<int> component_of_triangles(std::size_t vertices, const std::vector<
 }
 
 /// Whether a segment from p to q crosses a triangle, by the signs of volumes: an edge that the segment
-/// touches is_part for one of its triangles.
+/// touches is crossed for one of its triangles.
 bool crosses(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
     const Vec3 d = q - p, normal = (b - a).cross(c - a);
     if ((normal.dot(p - a) < 0.0) == (normal.dot(q - a) < 0.0)) return false;
@@ -50,8 +52,10 @@ std::vector<Surface::Diagonal> parted_diagonals(const std::vector<Vec3>& points,
     if (diagonals.empty()) return result;
     double longest = 0.0;
     for (const auto& d : diagonals) longest = std::max(longest, (d.to - d.from).norm());
-    std::vector<int> crossed(diagonals.size(), 0);
-    for (const Triangle& t : triangles) {
+    std::vector<std::atomic<int>> crossed(diagonals.size());  // counted by several threads
+    constexpr std::size_t kGrain = 1024;
+    parallel_for_each(triangles.size(), kGrain, [&](std::size_t n) {
+        const Triangle& t = triangles[n];
         const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
         const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
         auto d = std::lower_bound(
@@ -59,9 +63,9 @@ std::vector<Surface::Diagonal> parted_diagonals(const std::vector<Vec3>& points,
             [](const auto& diagonal, double x) { return std::min(diagonal.from.x(), diagonal.to.x()) < x; });
         for (; d != diagonals.end() && d->from.cwiseMin(d->to).x() <= high.x(); ++d)
             if ((d->from.cwiseMin(d->to).array() <= high.array()).all() &&
-                (d->from.cwiseMax(d->to).array() >= low.array()).all())
-                crossed[d - diagonals.begin()] += crosses(d->from, d->to, a, b, c);
-    }
+                (d->from.cwiseMax(d->to).array() >= low.array()).all() && crosses(d->from, d->to, a, b, c))
+                crossed[d - diagonals.begin()].fetch_add(1, std::memory_order_relaxed);
+    });
     for (std::size_t i = 0; i < diagonals.size(); ++i)
         if (crossed[i] > 0 && crossed[i] % 2 == 0) result.push_back(diagonals[i]);
     return result;

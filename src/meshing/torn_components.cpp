@@ -7,15 +7,19 @@
 #include <utility>
 
 #include "meshing/lattice_neighbours.h"
+#include "parallel_for_each.h"
+#include "surface/thread_probes.h"
 
 namespace isotrack {
 namespace {
 
 constexpr double kSmall = 4.0;            // lattice units, the largest extent
 constexpr std::size_t kMostBetween = 32;  // nodes that no part of the mesh holds
+constexpr std::size_t kGrain = 8;         // pieces
 
 struct Piece {
     int component;
+    Box box;
     std::vector<Node> nodes;  // that it holds, ascending
 };
 
@@ -27,10 +31,12 @@ std::vector<Piece> small_pieces(const MeshLines& lines, const std::vector<Vec3>&
     for (std::size_t t = 0; t < triangles.size(); ++t)
         for (const int v : triangles[t]) boxes[component[t]].extend(points[v]);
     std::vector<Piece> result;
-    for (std::size_t c = 0; c < boxes.size(); ++c) {
-        if (!is_part[c] || !(boxes[c].sizes().maxCoeff() <= kSmall)) continue;
-        Piece piece{static_cast<int>(c), {}};
-        const Vec3 from = boxes[c].min().array().floor(), to = boxes[c].max().array().ceil();
+    for (std::size_t c = 0; c < boxes.size(); ++c)
+        if (is_part[c] && boxes[c].sizes().maxCoeff() <= kSmall)
+            result.push_back({static_cast<int>(c), boxes[c], {}});
+    parallel_for_each(result.size(), kGrain, [&](std::size_t p) {
+        Piece& piece = result[p];
+        const Vec3 from = piece.box.min().array().floor(), to = piece.box.max().array().ceil();
         for (int x = static_cast<int>(from.x()); x <= to.x(); ++x)
             for (int y = static_cast<int>(from.y()); y <= to.y(); ++y)
                 MeshLines::for_each_pair(lines.line(x, y), [&](const auto& in, const auto& out) {
@@ -38,8 +44,9 @@ std::vector<Piece> small_pieces(const MeshLines& lines, const std::vector<Vec3>&
                     for (int z = static_cast<int>(std::ceil(in.z)); z <= out.z; ++z)
                         piece.nodes.push_back({x, y, z});
                 });
-        if (!piece.nodes.empty()) result.push_back(std::move(piece));
-    }
+    });
+    const auto is_empty = [](const Piece& piece) { return piece.nodes.empty(); };
+    result.erase(std::remove_if(result.begin(), result.end(), is_empty), result.end());
     std::stable_sort(result.begin(), result.end(),
                      [](const Piece& a, const Piece& b) { return a.nodes.size() < b.nodes.size(); });
     return result;
@@ -54,11 +61,16 @@ std::vector<int> torn_components(const MeshLines& lines, const std::vector<Vec3>
     if (std::count(is_part.begin(), is_part.end(), 1) < 2) return torn;
     std::vector<char> rest = is_part;
     const Eigen::Affine3d lattice = sides.surface().lattice();
-    const auto probe = sides.surface().probe();
-    const auto is_inside = [&](const Node& n) {
-        return probe->value(lattice * Vec3(n[0], n[1], n[2])) < 0.0;
+    ThreadProbes probes(sides.surface());
+    const auto is_inside = [&](const Node& n, Surface::Probe& probe) {
+        return probe.value(lattice * Vec3(n[0], n[1], n[2])) < 0.0;
     };
-    const auto is_of_rest = [&](const Node& n, int but_for) {
+    struct Look {
+        bool hangs_on_rest = false;
+        Eigen::AlignedBox2d seen;  // the lines that it depends on
+    };
+    const auto is_of_rest = [&](const Node& n, int but_for, Look& look) {
+        look.seen.extend(Eigen::Vector2d(n[0], n[1]));
         const auto [begin, end] = lines.line(n[0], n[1]);
         return std::count_if(begin, end,
                              [&](const MeshLines::Hit& h) {
@@ -69,13 +81,14 @@ std::vector<int> torn_components(const MeshLines& lines, const std::vector<Vec3>
     };
     // Calls `visit` with the inside nodes that an inside node is joined with, until one says that this is
     // enough.
-    const auto any_joined = [&](const Node node, const auto& visit) {
+    const auto any_joined = [&](const Node node, Surface::Probe& probe, const auto& visit) {
         std::vector<Node> steps;
         std::uint32_t inside = 1u << bit_of(0, 0, 0);
         for (int x = -1; x <= 1; ++x)
             for (int y = -1; y <= 1; ++y)
                 for (int z = -1; z <= 1; ++z) {
-                    if ((x == 0 && y == 0 && z == 0) || !is_inside({node[0] + x, node[1] + y, node[2] + z}))
+                    if ((x == 0 && y == 0 && z == 0) ||
+                        !is_inside({node[0] + x, node[1] + y, node[2] + z}, probe))
                         continue;
                     inside |= 1u << bit_of(x, y, z);
                     steps.push_back({x, y, z});
@@ -85,27 +98,38 @@ std::vector<int> torn_components(const MeshLines& lines, const std::vector<Vec3>
                    visit(Node{node[0] + step[0], node[1] + step[1], node[2] + step[2]});
         });
     };
-    const auto hangs_on_rest = [&](const Piece& piece) {
+    const auto look_at = [&](const Piece& piece) {
+        Look look;
+        Surface::Probe& probe = probes.local();
         // Within the rest, as a void is, it is not torn off it.
-        if (is_of_rest(piece.nodes.front(), piece.component)) return false;
+        if (is_of_rest(piece.nodes.front(), piece.component, look)) return look;
         std::vector<Node> hanging;
-        std::copy_if(piece.nodes.begin(), piece.nodes.end(), std::back_inserter(hanging), is_inside);
+        std::copy_if(piece.nodes.begin(), piece.nodes.end(), std::back_inserter(hanging),
+                     [&](const Node& n) { return is_inside(n, probe); });
         const std::size_t most = hanging.size() + kMostBetween;
-        for (std::size_t i = 0; i < hanging.size(); ++i)
-            if (any_joined(hanging[i], [&](const Node& other) {
-                    if (is_of_rest(other, piece.component)) return true;
-                    if (hanging.size() < most &&
-                        std::find(hanging.begin(), hanging.end(), other) == hanging.end())
-                        hanging.push_back(other);
-                    return false;
-                }))
-                return true;
-        return false;
+        for (std::size_t i = 0; i < hanging.size() && !look.hangs_on_rest; ++i)
+            look.hangs_on_rest = any_joined(hanging[i], probe, [&](const Node& other) {
+                if (is_of_rest(other, piece.component, look)) return true;
+                if (hanging.size() < most &&
+                    std::find(hanging.begin(), hanging.end(), other) == hanging.end())
+                    hanging.push_back(other);
+                return false;
+            });
+        return look;
     };
-    for (const Piece& piece : small_pieces(lines, points, triangles, component, is_part)) {
-        if (!hangs_on_rest(piece)) continue;
-        torn.push_back(piece.component);
-        rest[piece.component] = 0;
+    const std::vector<Piece> pieces = small_pieces(lines, points, triangles, component, is_part);
+    std::vector<Look> looks(pieces.size());
+    parallel_for_each(pieces.size(), kGrain, [&](std::size_t p) { looks[p] = look_at(pieces[p]); });
+    std::vector<Eigen::AlignedBox2d> gone;  // the lines of the torn ones: what saw them is out of date
+    for (std::size_t p = 0; p < pieces.size(); ++p) {
+        const bool is_stale = std::any_of(
+            gone.begin(), gone.end(),
+            [&](const Eigen::AlignedBox2d& lines_there) { return lines_there.intersects(looks[p].seen); });
+        if (!(is_stale ? look_at(pieces[p]) : looks[p]).hangs_on_rest) continue;
+        torn.push_back(pieces[p].component);
+        rest[pieces[p].component] = 0;
+        gone.emplace_back(pieces[p].box.min().head<2>().array().floor(),
+                          pieces[p].box.max().head<2>().array().ceil());
     }
     return torn;
 }

@@ -173,6 +173,22 @@ TEST(LatticeTopology, CallsASmallPartThatIsTornOffASpeck) {
               (std::vector<char>{0, 0}));
 }
 
+TEST(LatticeTopology, LooksAtManyPartsAsIfOneAfterTheOther) {
+    // Rods of three nodes, over each other and side by side, all torn in two: the part with one node is, and
+    // then the other hangs on nothing any more.
+    std::vector<openvdb::Coord> inside;
+    std::vector<TriangleMesh> bodies;
+    std::vector<char> torn;
+    for (int y = 0; y < 30; y += 6)
+        for (int z = 0; z < 48; z += 6) {
+            for (int x = 0; x <= 2; ++x) inside.emplace_back(x, y, z);
+            bodies.push_back(body_around(Vec3(1, y, z), Vec3(2, y, z)));
+            bodies.push_back(body_around(Vec3(0, y, z), Vec3(0, y, z)));
+            torn.insert(torn.end(), {0, 1});
+        }
+    EXPECT_EQ(specks_of(bodies, level_set_of(inside)), torn);
+}
+
 TEST(LatticeTopology, TakesNoVoidForTornOff) {
     // A ball with a void of three nodes, of which the mesh has four.
     std::vector<openvdb::Coord> inside;
