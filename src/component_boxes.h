@@ -9,23 +9,31 @@
 
 namespace isotrack {
 
-/// The box of the vertices of each component of some triangles, in the order of their least vertices.
-inline std::vector<Box> component_boxes(const std::vector<Vec3>& points,
-                                        const std::vector<Triangle>& triangles) {
+/// Of the vertices of each connected component of some triangles, in the order of their least vertices.
+struct ComponentBoxes {
+    std::vector<Box> boxes;
+    std::vector<int> of_vertex;  ///< Which box it is in; -1: it is of no triangle.
+};
+
+inline ComponentBoxes component_boxes(const std::vector<Vec3>& points,
+                                      const std::vector<Triangle>& triangles) {
     DisjointSets vertices(points.size());
+    std::vector<char> is_used(points.size(), 0);
     for (const Triangle& t : triangles)
-        for (const int v : {t[1], t[2]}) vertices.join(t[0], v);
-    std::vector<int> box_of(points.size(), -1);
-    for (const Triangle& t : triangles) box_of[vertices.least(t[0])] = 0;
-    std::vector<Box> result;
-    for (int v = 0; v < static_cast<int>(points.size()); ++v) {
-        int& box = box_of[vertices.least(v)];
-        if (box < 0) continue;  // of no triangle
-        if (vertices.least(v) == v) {
-            box = static_cast<int>(result.size());
-            result.emplace_back();
+        for (const int v : t) {
+            vertices.join(t[0], v);
+            is_used[v] = 1;
         }
-        result[box].extend(points[v]);
+    ComponentBoxes result{{}, std::vector<int>(points.size(), -1)};
+    for (int v = 0; v < static_cast<int>(points.size()); ++v) {
+        if (!is_used[v]) continue;
+        const int least = vertices.least(v);  // which was met before, if it is another
+        if (least == v) {
+            result.of_vertex[v] = static_cast<int>(result.boxes.size());
+            result.boxes.emplace_back();
+        }
+        result.of_vertex[v] = result.of_vertex[least];
+        result.boxes[result.of_vertex[v]].extend(points[v]);
     }
     return result;
 }

@@ -22,6 +22,8 @@ Replaced ReplaceableMesh::replaced(std::vector<int> numbers, std::vector<int> be
                                    Surface::Probe& probe) const {
     Replaced result;
     std::vector<Places> old;
+    old.reserve(numbers.size());  // here and below: threads wait for each other where blocks are taken
+    result.triangles.reserve(numbers.size());
     for (const int number : numbers) {
         old.push_back(places_of(triangles[number]));
         const auto& [a, b, c] = old.back();
@@ -32,6 +34,7 @@ Replaced ReplaceableMesh::replaced(std::vector<int> numbers, std::vector<int> be
     std::sort(numbers.begin(), numbers.end());
     std::sort(beside.begin(), beside.end());
     beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
+    result.beside.reserve(beside.size());
     for (const int number : beside) {
         if (std::binary_search(numbers.begin(), numbers.end(), number)) continue;
         const auto [a, b, c] = places_of(triangles[number]);
@@ -50,6 +53,7 @@ bool ReplaceableMesh::may_have(const std::vector<Places>& candidates, const Repl
     };
     if (!std::all_of(candidates.begin(), candidates.end(), faces)) return false;
     std::vector<FacingTriangle> after;
+    after.reserve(candidates.size());
     for (const auto& [a, b, c] : candidates) after.emplace_back(a, b, c);
     const auto stand_there = [&](const CrossingGrid* points_there) {
         return stand_for_same(*points_there, before.triangles, before.box, after, before.beside, tolerance);

@@ -132,6 +132,8 @@ bool any_cross(const std::vector<Vec3>& points, const std::vector<Triangle>& som
     const auto with_box = [&](const Triangle& t) { return Boxed{box_of(points, t), &t}; };
     const auto area = [&](const Triangle& t) { return has_area(points[t[0]], points[t[1]], points[t[2]]); };
     std::vector<Boxed> ours, near;
+    ours.reserve(some.size());
+    near.reserve(others.size());
     Box bounds;
     for (const Triangle& t : some)
         if (area(t)) {

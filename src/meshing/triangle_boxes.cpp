@@ -5,7 +5,7 @@
 #include <boost/geometry/geometries/box.hpp>
 #include <boost/geometry/geometries/point.hpp>
 #include <boost/geometry/index/rtree.hpp>
-#include <iterator>
+#include <boost/iterator/function_output_iterator.hpp>
 #include <utility>
 
 #include "meshing/triangle_box.h"
@@ -53,15 +53,13 @@ void TriangleBoxes::note(int changed_triangle) {
 }
 
 std::vector<int> TriangleBoxes::meeting(const Box& box) const {
-    std::vector<Entry> found;
-    impl_->tree.query(boost::geometry::index::intersects(to_tree(box)), std::back_inserter(found));
     std::vector<int> result;
-    for (const Entry& entry : found) result.push_back(entry.second);
+    const auto take = boost::make_function_output_iterator([&](const Entry& entry) {
+        if (impl_->box(entry.second).intersects(box)) result.push_back(entry.second);
+    });
+    impl_->tree.query(boost::geometry::index::intersects(to_tree(box)), take);
     std::sort(result.begin(), result.end());
     result.erase(std::unique(result.begin(), result.end()), result.end());
-    result.erase(
-        std::remove_if(result.begin(), result.end(), [&](int t) { return !impl_->box(t).intersects(box); }),
-        result.end());
     return result;
 }
 

@@ -76,7 +76,7 @@ std::vector<Vec3> unmatched_components(const FrameMesh& mesh, const std::vector<
         for (const Box& box : boxes)
             if (box.sizes().maxCoeff() < kSmall * resolution) middles.push_back(box.center());
     };
-    take_small(component_boxes(mesh.vertices, mesh.carved.triangles), ours);
+    take_small(component_boxes(mesh.vertices, mesh.carved.triangles).boxes, ours);
     take_small(of_lattice, theirs);
     if (ours.size() * theirs.size() > kMostPairs) return result;
     const auto take_unmatched = [&](const std::vector<Vec3>& some, const std::vector<Vec3>& others) {

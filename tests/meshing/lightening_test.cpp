@@ -2,6 +2,7 @@
 #include "meshing/lightening.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -121,6 +122,25 @@ TEST(Lightening, KeepsToleranceTopologyAndGapsOfALatticeMesh) {
     EXPECT_LT(light.triangles.size(), mesh.triangles.size() / 8);
     for (std::size_t i = 0; i < reached.size(); ++i)
         EXPECT_LE(support::distance_to_mesh(reached[i].point, light), kTolerance + 1e-6);
+}
+
+TEST(Lightening, IsTheSameAtAnyThreadCount) {
+    const auto sphere = shapes::sphere({0, 0, 0}, 1.0, 0.1);
+    const TriangleMesh mesh = support::icosphere(4);
+    const CrossingGrid nothing(std::vector<Surface::Crossing>{}, 0.1);
+    // Twenty-four patches, of whose boxes most meet, and twenty-eight that are apart.
+    for (const double least : {0.3, 0.6}) {
+        std::vector<char> may_go;
+        for (const Vec3& p : mesh.points)
+            may_go.push_back(std::sin(9.0 * p.x()) * std::sin(9.0 * p.y()) > least);
+        const auto by = [&](int threads) {
+            const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+            return lightened(mesh, may_go, *sphere, nothing, 0.02).triangles;
+        };
+        const auto alone = by(1);
+        EXPECT_LT(alone.size(), mesh.triangles.size() - 100);
+        for (int turn = 0; turn < 5; ++turn) EXPECT_EQ(by(4), alone);
+    }
 }
 
 TEST(Lightening, LeavesATetrahedronAlone) {
