@@ -1,6 +1,5 @@
 #include "isotrack/tracking/mesh_sequence.h"
 
-#include <openvdb/tools/Interpolation.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -20,6 +19,7 @@
 #include "isotrack/meshing/mesh_topology.h"
 #include "isotrack/meshing/self_intersections.h"
 #include "isotrack/surface/level_set.h"
+#include "tracking/advection.h"
 
 namespace isotrack {
 namespace {
@@ -82,23 +82,6 @@ void open_level_set(ReadFrame& frame, const std::string& path, const MeshSequenc
         level_set_options.iso = options.iso;
         frame.level_set = std::make_unique<LevelSet>(std::move(frame.grid), level_set_options);
     });
-}
-
-/// One frame along the velocity field, by the midpoint rule. `frame_time` in the unit of time of the
-/// velocities.
-Tracker::Motion motion_along(const openvdb::Vec3SGrid::ConstPtr& velocity, double frame_time) {
-    const bool staggered = velocity->getGridClass() == openvdb::GRID_STAGGERED;
-    const auto at = [velocity, staggered](const Vec3& p) {
-        const openvdb::Vec3d index = velocity->worldToIndex(openvdb::Vec3d(p.x(), p.y(), p.z()));
-        // The tree itself is sampled: slower than an accessor, but free to use from any thread.
-        const openvdb::Vec3s v =
-            staggered ? openvdb::tools::StaggeredBoxSampler::sample(velocity->constTree(), index)
-                      : openvdb::tools::BoxSampler::sample(velocity->constTree(), index);
-        const Vec3 result(v.x(), v.y(), v.z());
-        return result.allFinite() ? result : Vec3(Vec3::Zero());
-    };
-    return
-        [at, frame_time](const Vec3& p) { return Vec3(p + frame_time * at(p + 0.5 * frame_time * at(p))); };
 }
 
 TrackerOptions tracker_options(const MeshSequenceOptions& options, double voxel_size) {
@@ -349,7 +332,7 @@ RunReport mesh_sequence(const InputSequence& input, const std::string& output,
         Tracker::Motion motion;
         const int frames_passed = row.frame - tracked_frame;
         if (velocity && frames_passed > 0)
-            motion = motion_along(velocity, frames_passed / options.fps.value_or(1.0));
+            motion = motion_along(velocity, read.velocity, frames_passed / options.fps.value_or(1.0));
         Tracker::Finish finish_mesh = [] { return TrackedFrame(); };
         try {
             if (tracker) finish_mesh = tracker->begin(*read.level_set, motion);

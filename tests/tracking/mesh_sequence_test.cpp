@@ -428,6 +428,44 @@ TEST(MeshSequence, GivesVelocitiesPerFrameOrPerSecond) {
     EXPECT_NEAR(along / weight, 24.0 * data.step.x(), 0.1 * 24.0 * data.step.x());
 }
 
+TEST(MeshSequence, CarriesPointsByTheVelocitiesOfBothFramesAcrossAGap) {
+    // A ball that flies, and spins faster and faster, which its shape does not tell. Each grid knows the
+    // velocities around its surface alone. Frame 1 is missing.
+    const TempFolder folder;
+    constexpr double kRadius = 10.0 * kVoxel, kSpin = 0.2, kFaster = 0.05;  // radians a frame
+    const auto centre = [](int f) { return Vec3(10.0 * kVoxel * f, 0.0, 0.0); };
+    for (const int f : {0, 2}) {
+        const auto surface = surface_grid(*shapes::sphere(centre(f), kRadius, kVoxel));
+        const auto velocity = openvdb::Vec3SGrid::create();
+        velocity->setName("velocity");
+        velocity->setTransform(surface->transform().copy());
+        auto accessor = velocity->getAccessor();
+        for (auto value = surface->cbeginValueOn(); value; ++value) {
+            const Vec3 out = Vec3(surface->indexToWorld(value.getCoord()).asPointer()) - centre(f);
+            const Vec3 way = centre(1) - centre(0),
+                       v = way + (kSpin + kFaster * f) * Vec3::UnitZ().cross(out);
+            accessor.setValue(value.getCoord(), openvdb::Vec3s(openvdb::Vec3d(v.data())));
+        }
+        write_grids(folder.file("in." + std::to_string(f) + ".vdb"), surface, velocity);
+    }
+    const RunReport report =
+        mesh_sequence(find_frames({folder.file("in.#.vdb")}), folder.file("out.#.ply"), {});
+    ASSERT_EQ(status_of(report), Words(2, "ok"));
+    EXPECT_EQ(report.frames[1].lost, 0u);
+    const TriangleMesh mesh = read_mesh(folder.file("out.2.ply"));
+    double angles = 0.0, weights = 0.0;
+    for (std::size_t v = 0; v < mesh.points.size(); ++v) {
+        const Vec3 after = mesh.points[v] - centre(2),
+                   before = mesh.points[v] - 2.0 * mesh.velocities[v] - centre(0);
+        const double weight = after.head<2>().squaredNorm();
+        weights += weight;
+        angles += weight * std::atan2(before.x() * after.y() - before.y() * after.x(),
+                                      before.head<2>().dot(after.head<2>()));
+    }
+    const double exact = 2.0 * kSpin + 0.5 * kFaster * 4.0;
+    EXPECT_NEAR(angles / weights, exact, 0.05 * exact);
+}
+
 TEST(MeshSequence, RefusesWrongRequestsBeforeAnyWork) {
     const MovingSphere data(2);
     const auto refuses = [&](const std::string& output, const MeshSequenceOptions& options = {}) {

@@ -40,7 +40,9 @@ struct MeshSequenceOptions {
     UpdateStrategy delaunay = UpdateStrategy::Auto;
     bool fit = false;
     std::uint64_t seed = 1;
-    std::optional<std::string> grid, velocity_grid;  ///< NAME or NAME[i]; unset: chosen by `choose_grid`.
+    /// NAME or NAME[i]; unset: chosen by `choose_grid` and `choose_velocity_grid`. Points are carried by the
+    /// velocities of a frame and, if it has some, of the next.
+    std::optional<std::string> grid, velocity_grid;
     double iso = 0.0;
     /// > 0. Set: velocities, read and written, are per second. Unset: per frame.
     std::optional<double> fps;
