@@ -1,6 +1,7 @@
 #include "isotrack/sampling/relaxation.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 
@@ -19,14 +20,19 @@ constexpr int kLongestBlock = 16;
 
 int relax(Particles& particles, const Adjacency& adjacency, const Surface& surface, int sweeps,
           const std::vector<char>& restless) {
-    const auto groups = colour_groups(adjacency, kLongestBlock, restless);
-    ThreadProbes probes(surface);
-    const std::vector<Metric> metrics = metrics_of(particles);
+    std::vector<std::vector<ParticleBlock>> groups;
+    std::vector<Crease> crease;
+    std::vector<Metric> metrics;
     std::vector<double> lambda(particles.size(), 0.1);
+    tbb::parallel_invoke([&] { groups = colour_groups(adjacency, kLongestBlock, restless); },
+                         [&] {
+                             crease.resize(particles.size());
+                             metrics = metrics_of(particles);
+                         });
+    ThreadProbes probes(surface);
     std::vector<char> active = restless;
     if (active.empty()) active.assign(particles.size(), 1);
     std::vector<char> moved = active;  // in the last sweep; those that rest are in no group or stay
-    std::vector<Crease> crease(particles.size());
     int done = 0;
     const auto step = [&](int i, Surface::Probe& probe) {
         // Who is on a crease in the first sweep is brought back to it in the next ones.
