@@ -18,13 +18,15 @@ public:
         : grid_(std::move(grid)), is_staggered_(grid_->getGridClass() == openvdb::GRID_STAGGERED) {}
 
     Vec3 at_start(const Vec3& p) const {
-        if (!is_in_reach(p)) return Vec3::Zero();
-        const Vec3 v = known_at(p).value_or(nearest(p));
+        const std::optional<openvdb::Vec3d> index = to_index(p);
+        if (!index) return Vec3::Zero();
+        const std::optional<Vec3> known = known_at(*index);
+        const Vec3 v = known ? *known : nearest(*index);
         return v.allFinite() ? v : Vec3(Vec3::Zero());
     }
     std::optional<Vec3> on_the_way(const Vec3& p, const Vec3& start) const {
-        if (!is_in_reach(p)) return std::nullopt;
-        const std::optional<Vec3> v = known_at(p);
+        const std::optional<openvdb::Vec3d> index = to_index(p);
+        const std::optional<Vec3> v = index ? known_at(*index) : std::nullopt;
         return v && (*v - start).norm() < kSameFlow * start.norm() ? v : std::nullopt;
     }
 
@@ -32,16 +34,15 @@ private:
     // Not registered with the tree, which would lock: one is made for each look.
     using Accessor = openvdb::tree::ValueAccessor<const openvdb::Vec3STree, false>;
 
-    openvdb::Vec3d to_index(const Vec3& p) const { return grid_->worldToIndex(openvdb::Vec3d(p.data())); }
-
-    bool is_in_reach(const Vec3& p) const {
-        const openvdb::Vec3d index = to_index(p);
-        return Vec3(index.asPointer()).lpNorm<Eigen::Infinity>() < kMostVoxels;
+    /// None where it is too far off, or not finite.
+    std::optional<openvdb::Vec3d> to_index(const Vec3& p) const {
+        const openvdb::Vec3d index = grid_->worldToIndex(openvdb::Vec3d(p.data()));
+        if (!(Vec3(index.asPointer()).array().abs() < kMostVoxels).all()) return std::nullopt;
+        return index;
     }
     /// Between the active ones of the eight voxels around, of each component.
-    std::optional<Vec3> known_at(const Vec3& p) const {
+    std::optional<Vec3> known_at(const openvdb::Vec3d& index) const {
         const Accessor accessor(grid_->tree());
-        const openvdb::Vec3d index = to_index(p);
         Vec3 result;
         for (int axis = 0; axis < 3; ++axis) {
             openvdb::Vec3d x = index;
@@ -63,8 +64,8 @@ private:
         }
         return result;
     }
-    Vec3 nearest(const Vec3& p) const {
-        const openvdb::Vec3s v = grid_->tree().getValue(openvdb::Coord::round(to_index(p)));
+    Vec3 nearest(const openvdb::Vec3d& index) const {
+        const openvdb::Vec3s v = grid_->tree().getValue(openvdb::Coord::round(index));
         return {v.x(), v.y(), v.z()};
     }
 

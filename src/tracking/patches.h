@@ -14,8 +14,8 @@ namespace isotrack {
 /// sheets are thin, up to 8 resolutions, in the end even where that leaves the numbers as far off. Where that
 /// does not do and the numbers are off by 30 at most, small handles anywhere and the faces across which nodes
 /// are joined are looked at, then where the next sheet is within three resolutions, unless that is at
-/// hundreds of places, then all of the mesh, once: for one of up to 20 000 places two resolutions apart
-/// with no more than 50 square resolutions for each. All that is given up after 1000 patches, or as many as cover
+/// hundreds of places, then all of the mesh, once: for one of up to 20 000 places two resolutions apart with
+/// no more than 50 square resolutions for each. All that is given up after 1000 patches, or as many as cover
 /// 50 000 square resolutions, when 50 were too far from the surface, 50 meshes were refused, or those looked
 /// at had ten million triangles: what is left then stays wrong. `thickness`: per particle, the distance to
 /// the next sheet. New vertices stand on no particle, new triangles are no facets. Returns how many parts
